@@ -233,6 +233,25 @@ def field_bound(field: Field, body: Body, place: Place) -> float:
 
 
 @bare_inner_kernel
+def surely_hits(field: Field, body: Body, place: Place) -> bool:
+    """Whether a solid reaches into one of the discs inside the body, as the field tells."""
+    x, y, c, s = place
+    for d in range(body.discs.shape[0]):
+        q_x, q_y = body.discs[d, 0], body.discs[d, 1]
+        at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
+        at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
+        i, j = math.floor(at_x), math.floor(at_y)
+        if 0 <= i < field.distance.shape[1] and 0 <= j < field.distance.shape[0]:
+            # As in `field_bound`, but that distances grow no faster, either.
+            left = body.discs[d, 3] - field.distance[int(j), int(i)]
+            if left > 0.0:
+                e_x, e_y = field.cell * (at_x - i - 0.5), field.cell * (at_y - j - 0.5)
+                if e_x * e_x + e_y * e_y < left * left:
+                    return True
+    return False
+
+
+@bare_inner_kernel
 def bucket_of(buckets: Buckets, x: float, y: float) -> int:
     """The bucket that a place is in; -1 outside of all."""
     i = math.floor((x - buckets.origin_x) / buckets.cell)

@@ -146,18 +146,25 @@ def not_parted(
 ) -> int:
     """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
 
-    The motion begins at `place`. UNKNOWN where it covers more than the buckets know.
+    The motion begins at `place`. UNKNOWN where it covers more than the bucket knows.
     """
     x, y, c, s = place
     # FREE is a proof for the whole motion: its polygons hold all that the body covers, the lists of
     # the buckets all solids within `reach`, and along an axis each is farther than `enough`.
     buckets, solids = world.buckets, world.solids
     reach = swept.places[motion, 2] + enough
-    if not reach <= body.reach + buckets.reach:
+    if not reach < math.inf:
         return UNKNOWN
     m_x = x + c * swept.places[motion, 0] - s * swept.places[motion, 1]
     m_y = y + s * swept.places[motion, 0] + c * swept.places[motion, 1]
+    known = body.reach + buckets.reach
     k = bucket_of(buckets, m_x, m_y)
+    if reach > known and k >= 0:  # so far from any place of the bucket, farther from its middle
+        i, j = (m_x - buckets.origin_x) / buckets.cell, (m_y - buckets.origin_y) / buckets.cell
+        i, j = i - math.floor(i), j - math.floor(j)
+        known += buckets.cell * min(min(i, 1.0 - i), min(j, 1.0 - j)) - SHORT
+    if reach > known:
+        return UNKNOWN
     if k < 0:
         return FREE
     n_pieces = body.first.shape[0] - 1

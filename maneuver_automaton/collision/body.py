@@ -24,7 +24,7 @@ class Body(NamedTuple):
     edges: Array  # (V, 5) as in `Solids`
     first: IntArray  # (P + 1,)
     radius: Array  # (P,)
-    discs: Array  # (D, 3) x, y, radius: they cover the body
+    discs: Array  # (D, 4) x, y, radius: they cover the body; and that of one inside, 0: none
     middle_x: float  # [m] of a disc that holds the body ...
     middle_y: float
     reach: float  # ... and its radius
@@ -64,11 +64,11 @@ def fastest_points(body: Body, twists: Array) -> Array:
 
 
 def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
-    """Discs (n, 3) along the narrowest rectangle around a piece, and half its width."""
+    """Discs (n, 4) along the narrowest rectangle around a piece, and half its width."""
     import shapely
 
     if len(ring) == 1:
-        return np.array([[*ring[0], rounding]]), rounding
+        return np.array([[*ring[0], rounding, rounding]]), rounding
     around = shapely.get_coordinates(shapely.MultiPoint(ring).minimum_rotated_rectangle)
     if len(around) < 4:  # all corners on a line
         ends = ring[[np.argmin(ring @ [1.0, 1e-3]), np.argmax(ring @ [1.0, 1e-3])]]
@@ -84,7 +84,11 @@ def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
     # The corners of a slice are on the rim of its disc: by that share not outside for rounding.
     radius = math.hypot(0.5 * length / n, 0.5 * width) * (1.0 + 1e-12) + rounding
     centers = a + 0.5 * across + np.outer((np.arange(n) + 0.5) / n, along)
-    return np.column_stack([centers, np.full(n, radius)]), 0.5 * width + rounding
+    # From each middle to the nearest side, all of which turn left around the piece.
+    sides, apart = np.roll(ring, -1, axis=0) - ring, centers[:, None] - ring
+    left = sides[:, 0] * apart[..., 1] - sides[:, 1] * apart[..., 0]
+    within = np.maximum((left / np.hypot(*sides.T)).min(axis=1), 0.0) + rounding
+    return np.column_stack([centers, np.full(n, radius), within]), 0.5 * width + rounding
 
 
 def _inscribed(footprint: tuple[Shape, ...]) -> float:

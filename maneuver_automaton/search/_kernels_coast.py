@@ -13,6 +13,7 @@ import math
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision._kernels_clearance import surely_hits
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
 from maneuver_automaton.collision.arrays import Coast, Place, WorldArrays
@@ -20,6 +21,8 @@ from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search.arrays import BodyArrays, LatticeArrays, Scene
 from maneuver_automaton.words._kernels_library import NO_TRIM
+
+LOOKS = 40  # poses of a coast that are looked at, at most
 
 
 @bare_inner_kernel
@@ -252,6 +255,31 @@ def coast_inside(
 
 
 @bare_inner_kernel
+def coast_hits(
+    scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
+) -> bool:
+    """Whether coasting a trim surely is not free: poses about a body's width apart are looked at.
+
+    What hits cannot be proven free, and a look at the field costs a small part of a proof.
+    """
+    body, twist = lib.parts.body, lib.library.twists[trim]
+    if not body.half_width > 0.0 or not is_one_in_plane(scene, lib):
+        return False
+    steps = math.ceil(min(0.5 * abs(t) * lib.parts.fastest[trim] / body.half_width, LOOKS))
+    if steps < 1:
+        return False
+    d_x, d_y, turn = coast(twist[0], twist[1], twist[2], t / steps)
+    turn_c, turn_s = math.cos(turn), math.sin(turn)
+    x, y, c, s = pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2])
+    for _ in range(steps):
+        x, y = x + c * d_x - s * d_y, y + s * d_x + c * d_y
+        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+        if surely_hits(scene.layers.first.field, body, Place(x, y, c, s)):
+            return True
+    return False
+
+
+@bare_inner_kernel
 def coasted(
     lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> tuple[float, float, float, float]:
@@ -261,6 +289,15 @@ def coasted(
     )
     x, y, heading = compose(pose[0], pose[1], pose[2], d_x, d_y, turn)
     return x, y, heading, pose[3] + t * lib.library.twists[trim, 3]
+
+
+@bare_inner_kernel
+def coast_end(
+    lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
+) -> Place:
+    """The end of coasting a trim from a pose, as `swept_end` for any time."""
+    x, y, heading, _ = coasted(lib, trim, pose, t)
+    return Place(x, y, math.cos(heading), math.sin(heading))
 
 
 @bare_inner_kernel

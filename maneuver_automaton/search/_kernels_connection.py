@@ -13,6 +13,7 @@ from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.search._kernels_coast import (
     coast_free,
+    coast_hits,
     coast_inside,
     coasted,
     edge_end,
@@ -149,6 +150,15 @@ def connection_free(
 
     A trim of the word that is none, or the turn in place of a free heading, is passed over.
     """
+    # Most words are not free. Where no transition comes between, a look along all of a word says so
+    # of most of these, before any part of it is proven.
+    pose, one_class = joint.pose, lib.library.transitions.cost.shape[0] == 1
+    for n in range(3):
+        trim, t = word[n], times[n]
+        if one_class and 0 <= trim < lib.library.n_trims and t > 0.0:
+            if not coast_inside(scene, lib, trim, pose, t) or coast_hits(scene, lib, trim, pose, t):
+                return False
+            pose = coasted(lib, trim, pose, t)
     # (pose, before, clock) is where, in which trim and when the word is: at first its begin. The
     # fifth trim is the one of the goal, which lasts no time: only what leads to it is tested.
     pose, before, clock = joint.pose, joint.before, joint.clock

@@ -19,6 +19,7 @@ from maneuver_automaton.collision._kernels_clearance import field_bound
 from maneuver_automaton.collision._kernels_swept import FREE as NOTHING_MET
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, overlaps
 from maneuver_automaton.search._kernels_coast import (
+    coast_end,
     coast_inside,
     coast_proven,
     coasted,
@@ -227,16 +228,19 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
             if clearance <= scene.margin or climbs or not known:
                 state[QUERIES] += 1
                 # The price of a proof rises in three steps: one polygon that holds all of the edge;
-                # where that meets a solid, whether the vehicle does at the end, unless the time of
-                # the contact is asked for; and the proof along the edge.
+                # where that meets a solid, whether the vehicle does at the end, or where the least
+                # that is kept of it would end; and the proof along the edge.
                 motion = trim * durations.shape[1] + q
                 met = edge_swept(scene, lib, motion, pose) if known else UNKNOWN
                 first = scene.layers.first
                 end = swept_end(lib, motion, pose, child)
+                if met >= 0 and cut.kept:
+                    least = (cut.back_off + cut.shortest) / lib.parts.fastest[trim]
+                    end = coast_end(lib, trim, pose, task.sign * min(t, least))
                 if met == NOTHING_MET:
                     clearance = field_bound(first.field, lib.parts.body, end)
                     clearance = max(clearance - scene.keep, scene.margin)
-                elif met >= 0 and not cut.kept and overlaps(first, lib.parts.body, end, met):
+                elif met >= 0 and overlaps(first, lib.parts.body, end, met):
                     free = 0.0
                 else:
                     clock = limits.clock + task.sign * spent

@@ -95,7 +95,8 @@ def cell_key(
     i = math.floor((c * d_x + s * d_y) / cell + 0.5) & (sides - 1)
     j = math.floor((c * d_y - s * d_x) / cell + 0.5) & (sides - 1)
     turn = (heading - to_heading) / FULL_TURN
-    k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
+    k = math.floor((turn - math.floor(turn)) * n_headings + 0.5)
+    k = 0 if k == n_headings else k
     level = math.floor(z / cells.rise + 0.5) & (levels - 1) if levels > 1 else 0
     tick = math.floor(time / cells.tick) & (ticks - 1) if cells.tick > 0.0 else 0
     # Digits of one number, the least last. Cells `sides` apart along an axis share a number, as do

@@ -39,7 +39,8 @@ from maneuver_automaton.words._kernels_steering import (
 from maneuver_automaton.words.library import LibraryArrays, Scratch
 
 WHOLE = 1e-9  # share of a full turn that counts as none
-PATH = 3  # column of a word, after its trims
+PATH, WAYS = 3, 4  # columns of a word, after its trims
+NEARLY = 1e-7  # [rad] and share by which a bound is taken lower than it is
 
 
 @inner_kernel
@@ -146,28 +147,67 @@ def lasting(lib: LibraryArrays, trim: int, t: float) -> float:
 
 
 @bare_inner_kernel
+def least_prices(lib: LibraryArrays) -> tuple[float, float]:
+    """Least cost of a second of driving straight, and of a radian of turning; inf for none."""
+    second, radian = math.inf, math.inf
+    for n in range(lib.n_trims):
+        turn_rate = lib.twists[n, 2]
+        if turn_rate != 0.0:
+            radian = min(radian, lib.rates[n] / abs(turn_rate))
+        elif lib.per_metre[n] < math.inf:
+            second = min(second, lib.rates[n])
+    return second, radian
+
+
+@bare_inner_kernel
+def ahead(lib: LibraryArrays, word: IntArray, n: int) -> tuple[complex, float]:
+    """Motion of a trim of a word, of a straight one as on the path that the word is of."""
+    v, turn_rate = motion_of(lib, word[n])
+    return (-v if turn_rate == 0.0 and word[WAYS] >> n & 1 else v), turn_rate
+
+
+@bare_inner_kernel
 def solve_path(
     lib: LibraryArrays,
     word: IntArray,
     goal: tuple[complex, float, complex],
-    limits: tuple[float, float],
+    bound: tuple[float, float, float],
     branches: Array,
     out: Array,
 ) -> None:
-    """Fill `out` (2, 3, 2) with the times of three trims, were each to turn left or right.
+    """Fill `out` (2, 3, 2) with the times of three trims, each of them driven the one way or other.
 
-    Nothing lies between them. `branches` (2, 3) is room for their `extents`.
+    Nothing lies between them. `branches` (2, 3) is room for their `extents`. `bound` is what a word
+    has to undercut, and the `least_prices`: where none does, the first time is inf.
     """
-    motions = motion_of(lib, word[0]), motion_of(lib, word[1]), motion_of(lib, word[2])
+    upper_bound, second, radian = bound
+    motions = ahead(lib, word, 0), ahead(lib, word, 1), ahead(lib, word, 2)
+    # Whatever word it is, its turns add up to the goal's heading, unless that is free.
+    least, turn = 0.0, abs(nearest_turn(goal[1])) - NEARLY
+    if turn > 0.0 and word[2] < lib.n_trims:
+        least = turn * radian
+    most = (1.0 + NEARLY) * (upper_bound - least) / second + NEARLY
+    limits = lib.rounding.tolerance, -most, most
     extents(motions, ((0j, 0.0), (0j, 0.0)), goal, limits, branches)
+    cheap = False
     for branch in range(2):
+        least = 0.0
         for n in range(3):
             _, turn_rate = motions[n]
-            left = right = branches[branch, n]
-            if turn_rate != 0.0 and not math.isnan(left):
-                left, right = turn_time(left, abs(turn_rate)), turn_time(left, -abs(turn_rate))
-            out[branch, n, 0] = lasting(lib, word[n], left)
-            out[branch, n, 1] = lasting(lib, word[n], right)
+            one, price = branches[branch, n], second
+            other = -one
+            if turn_rate != 0.0:
+                price = abs(turn_rate) * radian if word[n] < lib.n_trims else 0.0
+                if not math.isnan(one):
+                    one, other = turn_time(one, abs(turn_rate)), turn_time(one, -abs(turn_rate))
+            one, other = lasting(lib, word[n], one), lasting(lib, word[n], other)
+            out[branch, n, 0], out[branch, n, 1] = one, other
+            if math.isnan(one) or other < one:
+                one = other
+            least += one * price
+        cheap = cheap or least * (1.0 - NEARLY) < upper_bound
+    if not cheap:
+        out[0, 0, 0] = math.inf
 
 
 @bare_shared_kernel
@@ -198,6 +238,7 @@ def candidates(
     # One class: all transitions are the identity at the price of a switch, so nothing is folded,
     # and every word is steered from the same pose to the same pose.
     one_class = lib.transitions.cost.shape[0] == 1
+    bound = (upper_bound, *least_prices(lib))
     count = 0
     # Without a climb first, then each trim that climbs as the last of the word: those that only
     # climb, then those that drive as they do, whose time has to be known before the word is
@@ -264,8 +305,12 @@ def candidates(
             # A word costs at least the distance at the price per metre of its cheapest trim: what
             # cannot be cheaper than the bound is left out before it is steered. For one class this
             # is the hot test of the search, so it knows no transition.
-            if one_class and n_trims == 3:
-                price = min(lib.per_metre[a], lib.per_metre[b], lib.per_metre[c])
+            if one_class and (shared or n_trims == 3):
+                price = lib.per_metre[a] if a >= 0 else math.inf
+                if b >= 0:
+                    price = min(price, lib.per_metre[b])
+                if c >= 0:
+                    price = min(price, lib.per_metre[c])
                 if distance > lib.rounding.met and not distance * price < upper_bound:
                     continue
             else:
@@ -276,19 +321,28 @@ def candidates(
                 if not fixed + distance_cost(lib, distance, a, b, c) < upper_bound:
                     continue
             branches = scratch.branches
-            n_branches = 1
+            n_branches, cheap = 1, 3  # a bit for each branch that may be cheap enough
             if n_trims == 3:
                 # No branch with a time below the least is of use.
                 limits = (lib.rounding.tolerance, -lib.rounding.tolerance)
                 n_branches = 2
                 if shared:
-                    solved = scratch.solved[words[row, PATH]]
+                    solved, ways = scratch.solved[words[row, PATH]], words[row, WAYS]
                     if solved[0, 0, 0] == -math.inf:
-                        solve_path(lib, words[row], rel, limits, branches, solved)
+                        solve_path(lib, words[row], rel, bound, branches, solved)
+                    if solved[0, 0, 0] == math.inf:
+                        continue
+                    cheap = 0
                     for branch in range(2):
-                        for n in range(3):
-                            right = 1 if lib.twists[words[row, n], 2] < 0.0 else 0
-                            branches[branch, n] = solved[branch, n, right]
+                        times = solved[branch ^ (ways >> 3)]
+                        first, second = times[0, ways & 1], times[1, ways >> 1 & 1]
+                        third = times[2, ways >> 2 & 1]
+                        # Without the prices of switches, NaN where a time is.
+                        least = first * lib.rates[a] + second * lib.rates[b] + third * lib.rates[c]
+                        if least < upper_bound:
+                            cheap |= 1 << branch
+                            branches[branch, 0], branches[branch, 1] = first, second
+                            branches[branch, 2] = third
                 else:
                     motions = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
                     nothing = (0j, 0.0)  # displacements known to be none cost no time
@@ -314,14 +368,16 @@ def candidates(
             # unless the trim before goes on. Switches are priced between trims that last, as a trim
             # without time is not driven.
             for branch in range(n_branches):
-                least = fixed  # without the prices of switches, NaN where a time is
-                for n in range(n_trims):
-                    if not shared or n_trims < 3:
-                        branches[branch, n] = lasting(lib, words[row, n], branches[branch, n])
-                    if branches[branch, n] != 0.0:
-                        least += branches[branch, n] * lib.rates[words[row, n]]
-                if not least < upper_bound:
+                if not cheap >> branch & 1:
                     continue
+                if not shared or n_trims < 3:
+                    least = fixed
+                    for n in range(n_trims):
+                        branches[branch, n] = lasting(lib, words[row, n], branches[branch, n])
+                        if branches[branch, n] != 0.0:
+                            least += branches[branch, n] * lib.rates[words[row, n]]
+                    if not least < upper_bound:
+                        continue
                 cost, duration, usable, driven = fixed, 0.0, True, 0
                 trim, gear = start_trim, start_gear
                 for n in range(n_trims):

@@ -13,6 +13,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 
+MISSED = 1e-6  # share of all lengths by which a word surely misses: rounding is far below it
+
 
 @inner_kernel
 def unit(angle: float) -> complex:
@@ -24,6 +26,12 @@ def unit(angle: float) -> complex:
 def length(z: complex) -> float:
     """Length of a complex number that is neither huge nor tiny, where `abs` takes no chances."""
     return math.sqrt(z.real * z.real + z.imag * z.imag)
+
+
+@inner_kernel
+def size_of(z: complex) -> float:
+    """Sum of both parts of a complex number without their signs: not below its length."""
+    return abs(z.real) + abs(z.imag)
 
 
 @inner_kernel
@@ -137,28 +145,42 @@ def steer_two(
     tolerance: float,
     out: Array,
 ) -> None:
-    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
+    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can.
+
+    Two times are one fewer than the goal has coordinates: most words of two miss it by far, which
+    a length or a product tells before any angle is taken.
+    """
     v_a, w_a = a
     d, e = step
     v_b, w_b = b
     z, heading, facing = goal
     out[0], out[1], out[2] = math.nan, math.nan, 0.0
+    r_a, r_b = radius_of(v_a, w_a), radius_of(v_b, w_b)
+    turned = unit(e) if e != 0.0 else 1.0 + 0j
+    sizes = size_of(z) + size_of(r_a) + size_of(r_b) + size_of(d) + size_of(v_a) + size_of(v_b)
+    far = MISSED * (1.0 + sizes)
     if w_a != 0.0 and w_b != 0.0:
-        r_a, r_b = radius_of(v_a, w_a), radius_of(v_b, w_b)
-        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * facing
+        arm, aim = r_a + d - r_b * turned, z + r_a - r_b * facing
+        # The difference of two squares, so that no root is taken of those that miss.
+        gap = aim.real * aim.real + aim.imag * aim.imag - arm.real * arm.real - arm.imag * arm.imag
+        if abs(gap) > far * (size_of(aim) + size_of(arm)):
+            return
         if length(arm) > tolerance * (length(r_a) + length(r_b) + length(d)):
             angle = phase(aim) - phase(arm)
             out[0] = turn_time(angle, w_a)
             out[1] = turn_time(heading - e - angle, w_b)
     elif w_a != 0.0 and length(v_b) > 0.0:
         angle = heading - e
-        r_a = radius_of(v_a, w_a)
-        out[0] = turn_time(angle, w_a)
-        out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * facing)
+        after = unit(angle) if e != 0.0 else facing
+        left, along = z - r_a * (after - 1.0) - d * after, v_b * facing
+        if abs((left * along.conjugate()).imag) <= far * size_of(v_b):
+            out[0] = turn_time(angle, w_a)
+            out[1] = straight_time(left, along)
     elif w_b != 0.0 and length(v_a) > 0.0:
-        r_b = radius_of(v_b, w_b)
-        out[0] = straight_time(z - d - r_b * (facing - unit(e)), v_a)
-        out[1] = turn_time(heading - e, w_b)
+        left = z - d - r_b * (facing - turned)
+        if abs((left * v_a.conjugate()).imag) <= far * size_of(v_a):
+            out[0] = straight_time(left, v_a)
+            out[1] = turn_time(heading - e, w_b)
     elif w_a == 0.0 and w_b == 0.0 and length(v_a) > 0.0 and length(v_b) > 0.0:
         out[0], out[1] = two_lines(z - d, v_a, v_b * facing, tolerance)
 
@@ -168,17 +190,18 @@ def extents(
     word: tuple[tuple[complex, float], tuple[complex, float], tuple[complex, float]],
     steps: tuple[tuple[complex, float], tuple[complex, float]],
     goal: tuple[complex, float, complex],
-    limits: tuple[float, float],
+    limits: tuple[float, float, float],
     out: Array,
 ) -> None:
     """Fill `out` (2, 3) with the angles of turns and the times of straights, NaN where none.
 
-    As `steer`, but that turns count by their circles, whichever way and how fast they are driven.
+    As `steer`, but that turns count by their circles, whichever way and how fast they are driven,
+    and a straight beside two turns lasts no longer than the third of the `limits`.
     """
     (v_a, w_a), (v_b, w_b), (v_c, w_c) = word
     (d_1, e_1), (d_2, e_2) = steps
     z, heading, turn_3 = goal
-    tolerance, least = limits
+    tolerance, least, most = limits
     for row in range(2):
         for k in range(3):
             out[row, k] = math.nan
@@ -212,7 +235,7 @@ def extents(
             later, earlier = line_and_circle(-still, along, length(d), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if time >= least:
+                if least <= time <= most:
                     angle = phase(d) - phase(still + along * time)
                     out[row, 0], out[row, 1], out[row, 2] = angle, time, before_c - angle - e_1
     elif w_b != 0.0 and w_c != 0.0:  # straight, turn, turn
@@ -221,7 +244,7 @@ def extents(
             later, earlier = line_and_circle(point, v_a, length(at_2), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if time >= least:
+                if least <= time <= most:
                     angle = phase(point - v_a * time) - phase(at_2)
                     out[row, 0], out[row, 1], out[row, 2] = time, angle - e_1, before_c - angle
     elif w_a != 0.0 and w_b != 0.0:  # turn, turn, straight
@@ -231,7 +254,7 @@ def extents(
             later, earlier = line_and_circle(point, along, length(at_1), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if time >= least:
+                if least <= time <= most:
                     angle = phase(point - along * time) - phase(at_1)
                     out[row, 0], out[row, 1], out[row, 2] = angle, before_c - angle - e_1, time
     elif w_b != 0.0:  # straight, turn, straight
@@ -270,7 +293,7 @@ def steer(
     [0, one turn); straight times may be negative, which the caller rejects. Between two turns, or
     beside them, one below the least counts as none at all. A branch has all its times or none.
     """
-    extents(word, steps, goal, limits, out)
+    extents(word, steps, goal, (*limits, math.inf), out)
     for row in range(2):
         for n in range(3):
             _, turn_rate = word[n]

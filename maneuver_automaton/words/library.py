@@ -158,9 +158,9 @@ class TransitionArrays(NamedTuple):
 class WordTable(NamedTuple):
     """The words that are tried where two poses are to be connected."""
 
-    words: IntArray  # (K, 4) three trims, NO_TRIM for none, and a path; those of few trims first
+    words: IntArray  # (K, 5) three trims, NO_TRIM for none, path, ways; those of few trims first
     n_few: int  # how many these are
-    free_words: IntArray  # (F, 4) that end with the turn of a free heading
+    free_words: IntArray  # (F, 5) that end with the turn of a free heading
     climbs: IntArray  # (c,) trims that only climb or sink, then such that drive straight with it
     n_upright: int  # how many only climb or sink
 
@@ -204,7 +204,7 @@ class Scratch(NamedTuple):
     climbs: IntArray  # (n,) the climbing trim at its end, NO_TRIM for none
     times: Array  # (n, 4) [s] of up to three trims and the climb
     branches: Array  # (2, 3) [s] of three trims, on both branches
-    solved: Array  # (P, 2, 3, 2) [s] the same of each path, were a trim to turn left or right
+    solved: Array  # (P, 2, 3, 2) [s] the same of each path, were a trim driven either way
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -336,9 +336,9 @@ def library_arrays(
             length=np.hypot(displacement[..., 0], displacement[..., 1]),
         ),
         tried=WordTable(
-            words=np.zeros((0, 4), dtype=np.int64),
+            words=np.zeros((0, 5), dtype=np.int64),
             n_few=0,
-            free_words=np.zeros((0, 4), dtype=np.int64),
+            free_words=np.zeros((0, 5), dtype=np.int64),
             climbs=np.concatenate([upright, sloping]).astype(np.int64),
             n_upright=len(upright),
         ),
@@ -354,13 +354,22 @@ def with_words(
 ) -> LibraryArrays:
     """The arrays with the words that are tried, (K, 3) and (F, 3), the first `n_few` often.
 
-    Words are of one path if their trims differ in nothing but the way in which they turn.
+    Words of three trims are of one path if these differ in nothing but the way in which they are
+    driven. The ways are bits: of each trim, 1 to turn right or to drive back; and whether the
+    branches are those of the path in turn, as they are where one straight is driven back.
     """
     every = np.concatenate([words, free_words])
     twists = arrays.twists[every, :3]
-    left = twists * np.where(twists[..., 2:] < 0.0, -1.0, 1.0) + 0.0  # no zero has a sign
-    _, path = np.unique(left.reshape(-1, 9), axis=0, return_inverse=True)
-    rows, n = np.column_stack([every, path]), len(words)
+    v_x, v_y, turn = np.moveaxis(twists, -1, 0)
+    straight = turn == 0.0
+    back = (turn < 0.0) | (straight & ((v_x < 0.0) | ((v_x == 0.0) & (v_y < 0.0))))
+    in_turn = (straight.sum(axis=1) == 1) & (straight & back).any(axis=1)
+    ways = np.column_stack([back, in_turn]) @ (1 << np.arange(4))
+    path = np.zeros(len(every), dtype=np.int64)
+    full = every[:, 2] != NO_TRIM
+    ahead = twists[full] * np.where(back[full], -1.0, 1.0)[..., None] + 0.0  # no zero has a sign
+    path[full] = np.unique(ahead.reshape(-1, 9), axis=0, return_inverse=True)[1].ravel()
+    rows, n = np.column_stack([every, path, ways]), len(words)
     tried = arrays.tried._replace(words=rows[:n], n_few=n_few, free_words=rows[n:])
     return arrays._replace(tried=tried)
 

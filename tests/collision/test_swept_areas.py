@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.collision._kernels_clearance import surely_hits
 from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, not_parted, overlaps
 from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.arrays import Place
@@ -70,13 +71,16 @@ def place_of(pose):
 
 @kernel
 def parted(world, body, swept, poses, enough, ends, out):
-    """`not_parted` of every pose and motion, and whether what is met overlaps the end."""
+    """`not_parted` of every pose and motion, and whether the end surely is not free."""
     for k in range(poses.shape[0]):
         for motion in range(swept.places.shape[0]):
             p = not_parted(world, body, swept, motion, place_of(poses[k]), enough)
             out[k, motion, 0] = p
-            if p >= 0 and overlaps(world, body, place_of(ends[k, motion]), p):
+            end = place_of(ends[k, motion])
+            if p >= 0 and overlaps(world, body, end, p):
                 out[k, motion, 1] = 1
+            if surely_hits(world.field, body, end):
+                out[k, motion, 1] = 2
 
 
 @pytest.mark.parametrize(("name", "keep"), [("truck", 0.1), ("point", 0.0)])
@@ -84,8 +88,8 @@ def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name,
     rng = np.random.default_rng([9, *name.encode()])
     footprint, margin = scenes.FOOTPRINTS[name], 0.005
     twists = np.array(scenes.TWISTS)
-    durations = np.full((len(twists), 2), [0.3, -0.9]) * rng.uniform(0.3, 1.0, (len(twists), 1))
-    verdicts = np.zeros(3, dtype=int)
+    durations = np.full((len(twists), 2), [0.3, -1.8]) * rng.uniform(0.3, 1.0, (len(twists), 1))
+    verdicts = np.zeros(4, dtype=int)
     for _ in range(4):
         obstacles = scenes.random_scene(rng, moving=0)
         world = world_around(footprint, obstacles, keep=keep)
@@ -105,13 +109,16 @@ def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name,
             ).T
             called = met[:, motion, 0]
             assert (free[called == FREE] == abs(t)).all()
-            assert (free[met[:, motion, 1] == 1] < abs(t)).all()
+            ends_in_it = met[:, motion, 1]
+            assert (free[ends_in_it > 0] < abs(t)).all()
             fastest = fastest_points(world.body, twist[None])[0]
             for pose in poses[called == FREE]:
                 since = np.linspace(0.0, t, 9)
                 apart = exact.clearance(driven(pose, twist, since), since)
                 assert apart.min() >= keep + margin - 1e-8
-            verdicts += [(called == FREE).sum(), (called >= 0).sum(), (called == UNKNOWN).sum()]
+            verdicts += [(called == one).sum() for one in (FREE, UNKNOWN)] + [
+                (called >= 0).sum(), (ends_in_it == 2).sum()
+            ]  # fmt: skip
             assert fastest >= 0.0
     assert verdicts[0] > 0
-    assert verdicts[1] > 0 or name == "point"
+    assert (verdicts[2:] > 0).all() or name == "point"

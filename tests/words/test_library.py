@@ -21,6 +21,11 @@ from tests.search.automata import joined_end, linked
 REST, AHEAD, LEFT, RIGHT = [0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 1.0], [0.8, 0, -1.0]
 SIDE, SPIN, BACK = [0.2, 0.7, 0], [0.0, 0, 1.3], [-0.5, 0, 0.2]
 CAR = [REST, AHEAD, LEFT, RIGHT, SIDE, SPIN, BACK]
+UNICYCLE = Automaton.of_controls(
+    Unicycle(),
+    {"rest": (0, 0), "ahead": (1, 0), "back": (-1, 0), "slowly": (-0.5, 0)}
+    | {"left": (1, 1), "left back": (-1, -1), "right": (0.7, -1), "spin": (0, 1.3)},
+)
 
 
 def off(end, goal):
@@ -57,16 +62,13 @@ def test_every_transfer_ends_at_the_goal_and_costs_its_time(goal, trims):
 
 
 def test_without_displacements_it_is_the_steering_of_a_kinematic_vehicle():
-    car = Automaton.of_controls(
-        Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "left": (1, 1), "right": (0.7, -1)}
-    )
-    library = library_of(car)
+    library, twists = library_of(UNICYCLE), UNICYCLE.body_velocities
     goal = np.array([3.0, -1.0, 2.0])
     rows = candidates(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
-    for word in itertools.product((1, 2, 3), repeat=3):
-        if word[0] == word[1] or word[1] == word[2]:
-            continue
-        known = steer(car.body_velocities[list(word)], goal)
+    for word in itertools.product(range(1, len(UNICYCLE)), repeat=3):
+        if not all(np.cross(twists[a], twists[b]).any() for a, b in itertools.pairwise(word)):
+            continue  # the one follows the path of the other
+        known = steer(twists[list(word)], goal)
         mine = np.array([row.durations for row in rows if row.trims == word]).reshape(-1, 3)
         assert len(mine) == len(known)
         for times in known:
@@ -84,3 +86,14 @@ def test_a_moved_problem_has_the_moved_answer(goal, by):
     )
     best, moved = here[0], there[0]
     assert moved.cost == pytest.approx(best.cost, abs=1e-6)
+
+
+@given(goal=poses(), bound=st.floats(0.1, 12.0))
+@settings(max_examples=30)
+@pytest.mark.parametrize("automaton", [UNICYCLE, linked(CAR)], ids=["at will", "by maneuvers"])
+def test_a_bound_leaves_out_what_costs_as_much_and_nothing_else(automaton, goal, bound):
+    library = library_of(automaton)
+    every = candidates(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
+    some = candidates(library, np.zeros(3), goal, start_trim=0, goal_trim=0, upper_bound=bound)
+    wanted = [(one.trims, one.durations.tolist()) for one in every if one.cost < bound]
+    assert [(one.trims, one.durations.tolist()) for one in some] == wanted
