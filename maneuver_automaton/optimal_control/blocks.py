@@ -43,6 +43,10 @@ class Blocks(NamedTuple):
         """Number of blocks."""
         return int(self.variables.shape[1])
 
+    def among(self, which: IntArray) -> Blocks:
+        """Some of them."""
+        return Blocks(self.kind, self.variables[:, which], self.given[:, which])
+
 
 class BlockProgram(NamedTuple):
     """A nonlinear program in symbols, with its derivatives."""
@@ -69,12 +73,14 @@ def kind_of(
     jacobian = casadi.jacobian(rows, variables)
     lagrangian = of_price * price + casadi.dot(of_rows, rows)
     hessian = casadi.triu(casadi.hessian(lagrangian, variables)[0])
-    known = [variables, given]
+    known, once = [variables, given], {"cse": True}  # like terms are computed once
     return Kind(
-        price=casadi.Function("price", known, [price]),
-        value=casadi.Function("value", known, [casadi.densify(rows)]),
-        slope=casadi.Function("slope", known, [_entries(casadi, jacobian)]),
-        curve=casadi.Function("curve", [*known, of_price, of_rows], [_entries(casadi, hessian)]),
+        price=casadi.Function("price", known, [price], once),
+        value=casadi.Function("value", known, [casadi.densify(rows)], once),
+        slope=casadi.Function("slope", known, [_entries(casadi, jacobian)], once),
+        curve=casadi.Function(
+            "curve", [*known, of_price, of_rows], [_entries(casadi, hessian)], once
+        ),
         jacobian=_places(jacobian),
         hessian=_places(hessian),
         size=variables.numel(),
