@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -131,7 +131,7 @@ class PolishProgram(NamedTuple):
     n_intervals: int
     bounds: Array  # (variables, 2)
     blocks: tuple[Blocks, ...]
-    walls: tuple[tuple[Blocks, Blocks], ...]  # of the nodes after the first, of all intervals
+    wall: tuple[Kind, Kind]  # of a node, and of an interval
     path: Any  # function of one interval: states, control, step -> x and y of the control points
     paced: bool
     model: Model
@@ -214,7 +214,7 @@ def program_of(
         n_intervals=count,
         bounds=bounds,
         blocks=tuple(_blocks(problem, model, kinds, gears, count, via)),
-        walls=tuple(_walls(problem, scene, settings, kinds, count)),
+        wall=(kinds.place, kinds.swing),
         path=_path(model, scene),  # type: ignore[arg-type]  # values both
         paced=paced,
         model=model,
@@ -241,10 +241,13 @@ def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Block
             kind = _guard_kind(*given)  # type: ignore[arg-type]  # values all
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
-    for (nodes, swings), which in zip(
-        program.walls, held[len(program.scene.guards) :], strict=True
+    for (a, b, c), which in zip(
+        program.scene.walls, held[len(program.scene.guards) :], strict=True
     ):
-        blocks += [nodes.among(which[which > 0] - 1), swings.among(which)]
+        wall = np.tile([[a], [b], [c - weight], [1.0 / program.n_intervals]], (1, len(which)))
+        inner, (node, swing) = which > 0, program.wall
+        blocks.append(Blocks(node, every[:2, which[inner]], wall[:3, inner]))
+        blocks.append(Blocks(swing, every[:, which], wall))
     return [one for one in blocks if one.number]
 
 
@@ -335,20 +338,6 @@ def _blocks(
             paces = np.vstack([controls[own, same], controls[own, same + 1]])
             found.append(Blocks(kinds.pace, paces, np.zeros((0, len(same)))))
     return [one for one in found if one.number]
-
-
-def _walls(
-    problem: OptimalControlProblem,
-    scene: PolishScene,
-    settings: PolishSettings,
-    kinds: IntervalKinds,
-    count: int,
-) -> Iterator[tuple[Blocks, Blocks]]:
-    every, share = _every(problem, count), np.full((1, count), 1.0 / count)
-    for a, b, c in scene.walls:
-        wall = np.tile(np.array([[a], [b], [c - settings.tightening]]), (1, count))
-        nodes = Blocks(kinds.place, every[:2, 1:], wall[:, 1:])
-        yield nodes, Blocks(kinds.swing, every, np.vstack([wall, share]))
 
 
 @functools.lru_cache(maxsize=16)

@@ -356,13 +356,6 @@ class _Polishing:
         work = self._work_left()
         return self._left() <= 0.0 or (work is not None and work <= 0)
 
-    def _room_for(self, last: Polished) -> bool:
-        """Whether three more solves like one fit in the time left."""
-        work = self._work_left()
-        if work is not None:
-            return work >= 3 * last.iterations
-        return self._left() >= 3.0 * (last.build_s + last.solve_s)
-
     def _rough(self, number: int, guess: Guess) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears; not where something moves."""
         if self.task.movers:
@@ -430,7 +423,8 @@ class _Polishing:
         raw = self.best_raw
         if raw is None or self._is_over() or np.ptp(raw.durations) > EVEN:
             return
-        if not self._room_for(raw):
+        work, took = self._work_left(), raw.build_s + raw.solve_s
+        if self._left() < 3.0 * took if work is None else work < 3 * raw.iterations:
             return
         steps = max(self.steps[self.best_guess], len(raw.durations))
         count = math.ceil(steps / FINER)
