@@ -66,15 +66,15 @@ def kind_of(
     zero, below = none if zero is None else zero, none if below is None else below
     price, rows = casadi.SX(price), casadi.vertcat(zero, below)
     of_price, of_rows = casadi.SX.sym("of_price"), casadi.SX.sym("of_rows", rows.shape[0])
-    jacobian = casadi.jacobian(rows, variables)
+    jacobian, weights = casadi.jacobian(rows, variables), (of_price, of_rows)
     lagrangian = of_price * price + casadi.dot(of_rows, rows)
     hessian = casadi.triu(casadi.hessian(lagrangian, variables)[0])
-    known = [variables, given]
+    known, once = [variables, given], {"cse": True}  # like terms are computed once
     return Kind(
-        price=casadi.Function("price", known, [price]),
-        value=casadi.Function("value", known, [casadi.densify(rows)]),
-        slope=casadi.Function("slope", known, [_entries(casadi, jacobian)]),
-        curve=casadi.Function("curve", [*known, of_price, of_rows], [_entries(casadi, hessian)]),
+        price=casadi.Function("price", known, [price], once),
+        value=casadi.Function("value", known, [casadi.densify(rows)], once),
+        slope=casadi.Function("slope", known, [_entries(casadi, jacobian)], once),
+        curve=casadi.Function("curve", [*known, *weights], [_entries(casadi, hessian)], once),
         jacobian=_places(jacobian),
         hessian=_places(hessian),
         size=variables.numel(),

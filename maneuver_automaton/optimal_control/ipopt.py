@@ -45,6 +45,7 @@ QUIET: dict[str, Any] = {
     "ipopt.sb": "yes",  # no banner
     "ipopt.mu_strategy": "monotone",
     "ipopt.bound_relax_factor": 0.0,  # limits are limits
+    "ipopt.min_refinement_steps": 0,  # of the linear solver: none unless residuals ask for one
 }
 
 

@@ -131,6 +131,7 @@ class PolishProgram(NamedTuple):
     n_intervals: int
     bounds: Array  # (variables, 2)
     blocks: tuple[Blocks, ...]
+    wall: tuple[Kind, Kind]  # of a node, and of an interval
     path: Any  # function of one interval: states, control, step -> x and y of the control points
     paced: bool
     model: Model
@@ -212,8 +213,9 @@ def program_of(
         dof=model.group.dof,
         n_intervals=count,
         bounds=bounds,
-        blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count, via)),
-        path=_path(casadi, model, scene),
+        blocks=tuple(_blocks(problem, model, kinds, gears, count, via)),
+        wall=(kinds.place, kinds.swing),
+        path=_path(model, scene),  # type: ignore[arg-type]  # values both
         paced=paced,
         model=model,
     )
@@ -229,17 +231,24 @@ def _every(problem: OptimalControlProblem, count: int) -> IntArray:
 
 
 def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Blocks]:
-    """What keeps the limits of each guard of the scene in the intervals where it is `held`."""
+    """What keeps each guard of the scene, then each wall, in the intervals where it is `held`."""
     every, weight = _every(program.problem, program.n_intervals), program.settings.tightening
     blocks = []
-    for guard, which in zip(program.scene.guards, held, strict=True):
+    for guard, which in zip(program.scene.guards, held, strict=False):
         if len(which):
             limits = guard._replace(solids=None)
             given = (program.model, limits, weight, program.paced)
             kind = _guard_kind(*given)  # type: ignore[arg-type]  # values all
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
-    return blocks
+    for (a, b, c), which in zip(
+        program.scene.walls, held[len(program.scene.guards) :], strict=True
+    ):
+        wall = np.tile([[a], [b], [c - weight], [1.0 / program.n_intervals]], (1, len(which)))
+        inner, (node, swing) = which > 0, program.wall
+        blocks.append(Blocks(node, every[:2, which[inner]], wall[:3, inner]))
+        blocks.append(Blocks(swing, every[:, which], wall))
+    return [one for one in blocks if one.number]
 
 
 def place_blocks(program: PolishProgram, first: int) -> list[Blocks]:
@@ -306,8 +315,6 @@ def _over(casadi: Any, model: Model, guard: Guard, z: Any, u: Any) -> list[Any]:
 def _blocks(
     problem: OptimalControlProblem,
     model: Model,
-    scene: PolishScene,
-    settings: PolishSettings,
     kinds: IntervalKinds,
     gears: Array | None,
     count: int,
@@ -315,16 +322,11 @@ def _blocks(
 ) -> list[Blocks]:
     n_x, own = problem.n_states, len(model.control_names)
     every = _every(problem, count)
-    begins, controls = every[:n_x], every[2 * n_x : -1]
-    share = np.full((1, count), 1.0 / count)
-    found = [Blocks(kinds.stage, every, share)]
+    controls = every[2 * n_x : -1]
+    found = [Blocks(kinds.stage, every, np.full((1, count), 1.0 / count))]
     if count > 1:
         found.append(Blocks(kinds.change, np.vstack([controls[:own, :-1], controls[:own, 1:]]),
                             np.zeros((0, count - 1))))  # fmt: skip
-    for a, b, c in scene.walls:
-        wall = np.tile(np.array([[a], [b], [c - settings.tightening]]), (1, count))
-        found.append(Blocks(kinds.place, begins[:2, 1:], wall[:, 1:]))
-        found.append(Blocks(kinds.swing, every, np.vstack([wall, share])))
     if gears is not None:
         signs = np.asarray(gears, dtype=np.float64)[None]
         found.append(Blocks(kinds.gear, every[: 2 * n_x + own], signs))
@@ -387,8 +389,10 @@ def _kinds(
     )  # fmt: skip
 
 
-def _path(casadi: Any, model: Model, scene: PolishScene) -> Any:
+@functools.lru_cache(maxsize=8)  # of a scene it is asked for with every guess
+def _path(model: Model, scene: PolishScene) -> Any:
     """Control points of every solid of the body in one interval, as a function."""
+    casadi = load_casadi()
     n_x = model.group.dof + len(model.reduced_names)
     first, last = casadi.SX.sym("a", n_x), casadi.SX.sym("b", n_x)
     control, step = casadi.SX.sym("u", len(model.control_names)), casadi.SX.sym("h")

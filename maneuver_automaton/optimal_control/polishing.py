@@ -447,6 +447,7 @@ def polish(
     elastic: bool = False,
     gears: Array | None = None,
     via: Sequence[NodeOnTheWay] = (),
+    begin: Begin = Begin.GUESS,
     budget: Budget = UNLIMITED,
 ) -> Polished:
     """A local optimum among obstacles near a guess.
@@ -474,6 +475,8 @@ def polish(
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
     via : sequence of (int, tuple)
         Nodes that are passed on the way; stretches between them take their own time.
+    begin : Begin
+        Nearby, where the guess is a solution with other steps.
     budget : Budget
         Its time is for all there is to do; every iteration of the solver asks it.
 
@@ -493,12 +496,12 @@ def polish(
     held = held_near(program, point, HELD * reach)
     if fixed_planes and apart.depth(program, point) > TOO_DEEP * reach:
         why = "the guess is too deep inside obstacles for fixed planes"
-        return _polished(point, _nothing(why), budget.elapsed - began)
+        return _polished(point, _nothing(why), len(apart.own), budget.elapsed - began)
     price = PRICE * float(point.durations.sum()) / reach if elastic else math.inf
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
     needed = 0.0  # [s] to build a program that was not built
-    begin, known = Begin.GUESS, None
+    known = None
     steps = _Steps(SHORT * reach, near) if scene.places else _Steps()
     rounds = settings.rounds + (PLACE_ROUNDS if scene.places else 0)
     for _ in range(FIXED_ROUNDS if fixed_planes else rounds):
@@ -567,10 +570,10 @@ def polish(
     if steps.kept is not None:
         best = steps.kept
         total = total._replace(status=SolveStatus.SOLVED, reason="settled", objective=steps.least)
-    return _polished(best, total, max(budget.elapsed - began, needed))
+    return _polished(best, total, len(apart.own), max(budget.elapsed - began, needed))
 
 
-def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
+def _polished(point: Point, total: SolverAnswer, lines: int, seconds: float) -> Polished:
     return Polished(
         status=total.status,
         reason=total.reason,
@@ -579,6 +582,7 @@ def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
         durations=point.durations,
         objective=total.objective,
         is_feasible=total.is_feasible,
+        lines=lines,
         iterations=total.iterations,
         build_s=seconds - total.seconds,
         solve_s=total.seconds,

@@ -283,10 +283,7 @@ def _geometries(rings: Sequence[Array]) -> Any:
 def _hulls(x: Array, y: Array) -> Any:
     import shapely
 
-    count = x.shape[1]
-    points = np.stack([x.T, y.T], axis=-1).reshape(-1, 2)
-    owner = np.repeat(np.arange(count), x.shape[0])
-    return shapely.convex_hull(shapely.multipoints(points, indices=owner))
+    return shapely.convex_hull(shapely.linestrings(np.stack([x.T, y.T], axis=-1)))
 
 
 def _least_penetration(own: Array, other: Array) -> tuple[float, Array]:
@@ -308,6 +305,7 @@ def _least_penetration(own: Array, other: Array) -> tuple[float, Array]:
 
 
 SWING = 1.1  # of what corners swing out between nodes is kept as a margin
+FURTHER = 2.0  # steps from a wall, from where the path between nodes does not reach it
 STANDS_OUT = 1e-6  # [m] before the piece that a line belongs to
 
 
@@ -423,7 +421,10 @@ def _both(program: PolishProgram, point: Point) -> tuple[list[Solid], list[Solid
 
 
 def held_near(program: PolishProgram, point: Point, within: float) -> list[IntArray]:
-    """For each guard of the scene the intervals (k,) in which the body comes nearer than so [m]."""
+    """For each guard of the scene the intervals (k,) in which the body comes nearer than so [m].
+
+    Then for each wall those from whose nodes a step twice as long may lead nearer than so.
+    """
     found = []
     for guard in program.scene.guards:
         if guard.solids is None:
@@ -431,6 +432,12 @@ def held_near(program: PolishProgram, point: Point, within: float) -> list[IntAr
             continue
         among = replace(program.scene, pieces=guard.solids, movers=())
         found.append(np.unique(pairs_near(program._replace(scene=among), point, within).interval))
+    places = point.state[:, :2]
+    steps = np.hypot(*np.diff(places, axis=0).T)
+    for a, b, c in program.scene.walls:
+        room = c - places @ np.array([a, b])
+        near = np.minimum(room[:-1], room[1:]) < within + FURTHER * steps
+        found.append(np.flatnonzero(near))
     return found
 
 

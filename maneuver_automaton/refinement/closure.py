@@ -18,6 +18,7 @@ from maneuver_automaton.primitives.driving import drive, drive_all
 STEPS = 5  # of Newton's method
 DIVERGED = 100.0  # times the least miss so far
 EXACT = 1e-13  # [m, rad, units of z], over the size of the motion, at which it is over
+AS_GOOD = 1e-3  # share of the miss that a step may leave without derivatives taken anew
 PROBE = 1e-5  # of central differences, in units of each variable
 INSIDE = 1e-12  # limits may be exceeded by rounding
 FIRST_STEP = 3.0  # times the first drive, that a step of Newton's method takes at most, about
@@ -66,7 +67,7 @@ def closed(
     low, high = model.control_limits.T
     best: PolishedMotion | None = None
     u, h = np.clip(control, low, high), np.array(durations)
-    since, longest = budget.elapsed, 0.0
+    since, longest, before, slopes = budget.elapsed, 0.0, math.inf, None
     for step in range(STEPS):
         try:
             course = drive(model, start_state, control=u, durations=h)
@@ -88,7 +89,9 @@ def closed(
         if budget.left_to_check <= longest:
             break
         since = now
-        by_control, by_pace = _derivatives(model, start_state, u, h)
+        if slopes is None or error > AS_GOOD * before:
+            slopes = _derivatives(model, course, u, h)
+        before, (by_control, by_pace) = error, slopes
         room = np.minimum(np.minimum(u - low, high - u), 1.0)
         columns = np.hstack([(by_control * room).reshape(len(by_control), -1), by_pace[:, None]])
         change = np.linalg.lstsq(columns[wanted], miss, rcond=None)[0]
@@ -113,15 +116,14 @@ def _why_not(model: Model, found: PolishedMotion) -> str:
     return ""
 
 
-def _derivatives(model: Model, start: Array, control: Array, h: Array) -> tuple[Array, Array]:
+def _derivatives(model: Model, course: Trajectory, control: Array, h: Array) -> tuple[Array, Array]:
     """Derivatives of the end (pose, reduced state) by all controls (n_e, n, n_u), by the pace."""
     n, n_u = control.shape
-    dof, n_z = model.group.dof, start.size
-    rides = drive_all(model, start[None], control=control[None], durations=h[None], max_step_m=9e9,
-                      max_step_rad=9e9)  # fmt: skip
-    course = rides[0]
-    poses, states = course.pose, course.reduced_state
-    columns = _local(model, states[:-1], control, h)  # (n, dof + n_z, n_z + n_u + 1)
+    dof, n_z = model.group.dof, course.reduced_state.shape[1]
+    begins = np.searchsorted(course.time, np.cumsum(h) - h)  # there is a sample at each
+    poses = course.pose[[*begins, -1]]
+    columns = _local(model, course.reduced_state[begins], control, h)
+    # columns: (n, dof + n_z, n_z + n_u + 1)
     moved, by_control = _carried(poses), np.empty((dof + n_z, n, n_u))
     by_pace = np.zeros(dof + n_z)
     by_state = np.vstack([np.zeros((dof, n_z)), np.eye(n_z)])  # of the end, by each node

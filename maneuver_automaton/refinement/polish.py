@@ -21,7 +21,7 @@ from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.polishing import polish
+from maneuver_automaton.optimal_control.polishing import Begin, held, intervals_for, polish
 from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.scene import (
     LEAST_DURATION,
@@ -292,6 +292,11 @@ def _closed_through(
     return motions
 
 
+def _in_steps(guess: Guess, count: int) -> Guess:
+    state = resampled(guess.state, count + 1)
+    return Guess(state=state, control=held(guess.control, count), duration=guess.duration)
+
+
 @dataclass(slots=True, eq=False)
 class _Polishing:
     """The state of one run."""
@@ -305,6 +310,8 @@ class _Polishing:
     accepts: Accepts
     best: PolishedMotion | None = None
     best_raw: Polished | None = None
+    best_guess: int = 0
+    steps: list[int] = field(default_factory=list)  # that each guess has
     reason: str = "no guess was given"
     attempts: list[Attempt] = field(default_factory=list)
     building: float = FIRST_BUILD  # [s] the longest so far
@@ -314,6 +321,10 @@ class _Polishing:
         for number, guess in enumerate(self.guesses):
             if self._is_over():
                 break
+            self.steps.append(len(guess.control))
+            if self.best is not None:  # it is slow: steps as short as those of a motion worth it
+                fewer = min(self.steps[-1], intervals_for(NEAR * self.best.objective))
+                guess = _in_steps(guess, fewer)
             rough = self._rough(number, guess)
             if rough is None:
                 continue
@@ -345,13 +356,6 @@ class _Polishing:
         work = self._work_left()
         return self._left() <= 0.0 or (work is not None and work <= 0)
 
-    def _room_for(self, last: Sequence[Attempt]) -> bool:
-        """Whether three more solves like the longest of some fit in the time left."""
-        work = self._work_left()
-        if work is not None:
-            return work >= 3 * max((one.iterations for one in last), default=0)
-        return self._left() >= 3.0 * max((one.seconds for one in last), default=0.0)
-
     def _rough(self, number: int, guess: Guess) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears; not where something moves."""
         if self.task.movers:
@@ -373,17 +377,17 @@ class _Polishing:
                     found = self._solve("lines", number, out.as_guess)
                     unfinished.append(found)
             if found.status is SolveStatus.SOLVED:
-                self._consider(found)
+                self._consider(found, number)
                 return None
         if self._left() > 0.0:
             unfinished.append(self._solve("gears", number, guess, gears=gears))
             if unfinished[-1].status is SolveStatus.SOLVED:
-                self._consider(unfinished[-1])
+                self._consider(unfinished[-1], number)
                 return None
         # None is solved; a result near enough to a motion is closed and audited all the same.
         for one in unfinished:
             if self.best is None and (one.is_feasible or one.status is SolveStatus.OUT_OF_BUDGET):
-                self._consider(one)
+                self._consider(one, number)
         return None
 
     def _among_movers(self, number: int, guess: Guess) -> Polished | None:
@@ -394,42 +398,44 @@ class _Polishing:
             if out.status is SolveStatus.SOLVED and not self._is_over():
                 found = self._solve("lines", number, out.as_guess)
         if found.is_feasible:
-            self._consider(found)
+            self._consider(found, number)
         return None
 
     def _lines(self, number: int, rough: Polished) -> None:
-        """Solve with free lines from the result of fixed planes, which is kept if that fails."""
-        if not self._is_over():
+        """Solve with free lines from the result of fixed planes, which is kept if that fails.
+
+        Without a line, and prices of places, that is what fixed planes have solved.
+        """
+        is_there = rough.status is SolveStatus.SOLVED and not (rough.lines or self.scene.places)
+        if not (is_there or self._is_over()):
             patient = replace(USUAL, max_iterations=LONGER * USUAL.max_iterations)
             found = self._solve("lines", number, rough.as_guess, settings=patient)
             # What was not solved to the end may be sound all the same: it is closed and audited.
             ended = found.is_feasible or found.status is SolveStatus.OUT_OF_BUDGET
             worth = found.status is SolveStatus.SOLVED or found.objective < rough.objective
-            if ended and worth and self._consider(found, number=number):
+            if ended and worth and self._consider(found, number):
                 return
-        if self.best is None:
-            self._consider(rough)
+        if is_there or self.best is None:
+            self._consider(rough, number)
 
     def _finer(self) -> None:
         """The best once more with smaller steps, while there is time for it."""
         raw = self.best_raw
         if raw is None or self._is_over() or np.ptp(raw.durations) > EVEN:
             return
-        if not self._room_for([one for one in self.attempts if one.kind != "fixed planes"]):
+        work, took = self._work_left(), raw.build_s + raw.solve_s
+        if self._left() < 3.0 * took if work is None else work < 3 * raw.iterations:
             return
-        count = math.ceil(len(raw.durations) / FINER)
-        if self.task.movers:
+        steps = max(self.steps[self.best_guess], len(raw.durations))
+        count = math.ceil(steps / FINER)
+        if self.task.movers or len(raw.durations) < steps:
             count = max(min(count, USUAL.nodes[1]), len(raw.durations) + 1)
         if count > USUAL.nodes[1]:
             return
-        guess = Guess(
-            state=resampled(raw.state, count + 1),
-            control=raw.control[(np.arange(count) * len(raw.control)) // count],
-            duration=raw.duration,
-        )
-        found = self._solve("finer", -1, guess)
+        guess = _in_steps(raw.as_guess, count)
+        found = self._solve("finer", self.best_guess, guess, begin=Begin.NEARBY)
         if found.is_feasible:
-            self._consider(found)
+            self._consider(found, self.best_guess)
 
     def _solve(
         self,
@@ -440,6 +446,7 @@ class _Polishing:
         fixed_planes: bool = False,
         elastic: bool = False,
         gears: Array | None = None,
+        begin: Begin = Begin.GUESS,
         most: int | None = None,
         settings: PolishSettings = USUAL,
     ) -> Polished:
@@ -460,6 +467,7 @@ class _Polishing:
             fixed_planes=fixed_planes,
             elastic=elastic,
             gears=gears,
+            begin=begin,
             budget=self.budget,
         )
         self.building = max(self.building, found.build_s)
@@ -477,7 +485,7 @@ class _Polishing:
             self.reason = f"{kind}: {found.reason}"
         return found
 
-    def _consider(self, found: Polished, *, number: int = -1, again: bool = True) -> bool:
+    def _consider(self, found: Polished, number: int, *, again: bool = True) -> bool:
         """Close the motion found, and keep it if it is accepted and better."""
         gears = None
         if not self.task.movers:  # whose places follow from an even pace
@@ -485,7 +493,8 @@ class _Polishing:
         if again and gears is not None and not self._is_over():
             steady = self._solve("gears", number, found.as_guess, gears=gears)
             worth = steady.objective < (1.0 + STEADY) * found.objective
-            if steady.is_feasible and worth and self._keep(steady, self._closed(steady), found):
+            kept = steady.is_feasible and worth
+            if kept and self._keep(number, steady, self._closed(steady), found):
                 return True
         ending = self._closed(found)
         if isinstance(ending, str):
@@ -497,8 +506,8 @@ class _Polishing:
             roomy = self._solve("room", number, found.as_guess, settings=roomier)
             if roomy.status is not SolveStatus.SOLVED:
                 return False
-            return self._consider(roomy, number=number, again=False)
-        return self._keep(found, ending, found)
+            return self._consider(roomy, number, again=False)
+        return self._keep(number, found, ending, found)
 
     @property
     def _reach(self) -> float:
@@ -515,7 +524,9 @@ class _Polishing:
             budget=self.budget,
         )
 
-    def _keep(self, found: Polished, ending: PolishedMotion | str, raw: Polished) -> bool:
+    def _keep(
+        self, number: int, found: Polished, ending: PolishedMotion | str, raw: Polished
+    ) -> bool:
         """Keep a closed motion if it is accepted and better; `raw` is where finer steps begin."""
         if isinstance(ending, str):
             return False
@@ -525,5 +536,5 @@ class _Polishing:
         if not self.accepts(motion):
             self.reason = "what was found is not accepted"
             return False
-        self.best, self.best_raw = motion, raw
+        self.best, self.best_raw, self.best_guess = motion, raw, number
         return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,16 +14,19 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
+from maneuver_automaton.optimal_control.polishing import intervals_for, polish
 from maneuver_automaton.optimal_control.scene import BodyPart, Polished
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.problem import Bounds
 from maneuver_automaton.refinement.closure import closed
 from maneuver_automaton.refinement.gear_sequences import (
     without_shuffles,
 )
 from maneuver_automaton.refinement.guesses import path_guesses, timed
-from maneuver_automaton.refinement.polish import PolishTask, polish_guesses
+from maneuver_automaton.refinement.polish import NEAR, PolishTask, polish_guesses
 from tests.inertia import CAR
 
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
@@ -147,6 +151,45 @@ def test_work_is_counted_in_iterations() -> None:
     assert kinds[0] == kinds[1]
 
 
+def test_where_no_line_is_needed_what_is_found_first_is_not_solved_again() -> None:
+    slow = replace(around(), duration=3.0 * around().duration)
+    found = polish_guesses(replace(swerve(), obstacles=()), [around(), slow], budget=UNLIMITED)
+    assert [(one.guess, one.kind) for one in found.attempts] == [
+        (0, "fixed planes"), (1, "fixed planes"), (found.attempts[-1].guess, "finer"),
+    ]  # fmt: skip
+
+
+def test_a_guess_of_a_slow_motion_gets_no_more_steps_than_the_best_may_have(monkeypatch) -> None:
+    steps = []
+
+    def recorded(model, ends, scene, guess, **values):
+        steps.append(len(guess.control))
+        return polish(model, ends, scene, guess, **values)
+
+    monkeypatch.setattr("maneuver_automaton.refinement.polish.polish", recorded)
+    slow = Guess(state=around().state.repeat(3, 0), control=around().control.repeat(3, 0),
+                 duration=3.0 * around().duration)  # fmt: skip
+    found = polish_guesses(replace(swerve(), obstacles=()), [around(), slow], budget=UNLIMITED)
+    assert found.motion is not None
+    assert steps[1] == intervals_for(NEAR * found.motion.objective) < len(slow.control)
+
+
+def test_bounds_count_where_the_way_comes_near_to_them() -> None:
+    task = swerve()
+    free = polish_guesses(task, [around()], budget=UNLIMITED).motion
+    assert free is not None
+    far = replace(task, bounds=Bounds(x=(-99.0, 99.0), y=(-99.0, 99.0)))
+    same = polish_guesses(far, [around()], budget=UNLIMITED).motion
+    assert same is not None
+    np.testing.assert_array_equal(same.control, free.control)
+    most = 0.99 * float(free.course.pose[:, 1].max())
+    low = replace(task, bounds=Bounds(x=(-99.0, 99.0), y=(-99.0, most)))
+    motion = polish_guesses(low, [around()], budget=UNLIMITED).motion
+    assert motion is not None
+    assert motion.course.pose[:, 1].max() <= most
+    assert free.duration < motion.duration < 1.01 * free.duration
+
+
 def test_a_change_of_direction_by_millimetres_is_none_that_a_plan_keeps() -> None:
     speeds = np.array([0.0, 0.8, 0.8, 0.0, -0.006, 0.0, 0.01, 0.0, -0.8, 0.0])
     state = np.zeros((len(speeds), 5))
@@ -159,6 +202,7 @@ def test_a_change_of_direction_by_millimetres_is_none_that_a_plan_keeps() -> Non
         durations=np.full(len(speeds) - 1, 0.1),
         objective=1.0,
         is_feasible=True,
+        lines=0,
         iterations=1,
         build_s=0.0,
         solve_s=0.0,
