@@ -113,11 +113,11 @@ def _path(shown: Shown) -> Iterator[dict[str, Any]]:
     places = _places(np.concatenate([track.pose, np.array([mover.end])]))  # pushed, it ends there
     length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
     facts = {"duration_s": mover.duration, "length_m": length, "cost": mover.cost}
-    yield _feature(_line(places), kind="path", **facts)
+    yield feature_of(_line(places), kind="path", **facts)
     for piece in track.pieces:
         begin, end = piece.time[[0, -1]].tolist()
         line = _line(_places(piece.pose))
-        yield _feature(line, kind="primitive", name=piece.name, begin_s=begin, end_s=end)
+        yield feature_of(line, kind="primitive", name=piece.name, begin_s=begin, end_s=end)
 
 
 def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
@@ -125,27 +125,27 @@ def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
     import shapely
 
     if swept := shown.swept:
-        yield _feature(_geometry(shapely.union_all(swept)), kind="swept")
+        yield feature_of(geometry_of(shapely.union_all(swept)), kind="swept")
     times = shown.track.switching_times
     times = times if len(times) else np.array([shown.mover.start_time])
     for name, body, track in shown.parts if shown.body else ():
         for time, pose in zip(times.tolist(), track.at(times), strict=True):
             outlines = [solid(Polygon(ring)) for ring in placed(body, pose[None])]
             facts = {"part": name, "time_s": time, "heading_rad": float(pose[2])}
-            yield _feature(_geometry(shapely.union_all(outlines)), kind="body", **facts)
+            yield feature_of(geometry_of(shapely.union_all(outlines)), kind="body", **facts)
 
 
 def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
     mover = shown.mover
-    yield _feature(_point(mover.start), kind="start", heading_rad=float(mover.start[2]))
+    yield feature_of(_point(mover.start), kind="start", heading_rad=float(mover.start[2]))
     for goal in mover.goals:
         heading = None if goal.free_heading else float(goal.pose[2])
         facts = {"heading_rad": heading, "tolerance_m": goal.tolerance_m}
-        yield _feature(_point(goal.pose), kind="goal", **facts)
+        yield feature_of(_point(goal.pose), kind="goal", **facts)
     for region in mover.road.scene.goals if mover.road else ():
         when = [time if math.isfinite(time) else None for time in region.time]
         for place in region.places or ():
-            yield _feature(_geometry(solid(place)), kind="goal", time_s=when)
+            yield feature_of(geometry_of(solid(place)), kind="goal", time_s=when)
 
 
 def _around(recording: Recording) -> Iterator[dict[str, Any]]:
@@ -157,16 +157,17 @@ def _around(recording: Recording) -> Iterator[dict[str, Any]]:
             facts["height_m"] = list(one.height)
         if isinstance(one, Obstacle) and one.motion is not None:
             facts["time_s"] = time
-        yield _feature(_geometry(geometry), kind="obstacle", **facts)
+        yield feature_of(geometry_of(geometry), kind="obstacle", **facts)
     for zone in recording.world.zones:
-        yield _feature(_geometry(solid(zone.shape)), kind="zone", name=zone.name)
+        yield feature_of(geometry_of(solid(zone.shape)), kind="zone", name=zone.name)
     road = recording.movers[0].road
     for lanelet in road.scene.lanelets if road else ():
         area = shapely.make_valid(shapely.Polygon(lanelet.ring), method="structure")
-        yield _feature(_geometry(area), kind="lanelet", id=lanelet.number)
+        yield feature_of(geometry_of(area), kind="lanelet", id=lanelet.number)
 
 
-def _feature(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[str, Any]:
+def feature_of(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[str, Any]:
+    """A feature of a kind, with facts about it."""
     return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": geometry}
 
 
@@ -202,9 +203,8 @@ def _point(pose: Array) -> dict[str, Any]:
     return {"type": "Point", "coordinates": _places(pose[None])[0].tolist()}
 
 
-def _geometry(geometry: Any) -> dict[str, Any]:
-    """A polygon, or several, outer rings to the left as RFC 7946 wants them."""
+def geometry_of(geometry: Any) -> Any:
+    """A geometry of shapely, outer rings to the left as RFC 7946 wants them."""
     import shapely
 
-    said: dict[str, Any] = json.loads(shapely.to_geojson(shapely.orient_polygons(geometry)))
-    return said
+    return json.loads(shapely.to_geojson(shapely.orient_polygons(geometry)))

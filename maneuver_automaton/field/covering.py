@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from maneuver_automaton._arrays import Array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, IntArray, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import terminal_error
 from maneuver_automaton.automaton import Plan
@@ -21,7 +21,6 @@ from maneuver_automaton.collision import Disc, Obstacle, Polygon
 from maneuver_automaton.collision.outline import outlines, united
 from maneuver_automaton.collision.shapes import reach_of
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.field.ordering import cheapest_order
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.planning import Planner, PlanResult, PlanStatus
 from maneuver_automaton.planning.checking import check_plan
@@ -34,6 +33,9 @@ PEAR = 2.75  # radii that a turn forwards alone takes, to a swath beside
 ROUND = 1e-9  # share of a width by which a field may be wider than so many swaths
 MOST_DIRECTIONS = 64  # that are tried, those of the longest edges
 MOST_SWATHS = 400
+MOST_EXACT = 12  # swaths whose orders are all looked at; the table has 2^n rows
+STARTS = 8  # tours that are improved
+DIGITS = 9  # of a cost: equal ones are told apart by their numbers alone, wherever the field is
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +128,7 @@ class FieldProblem:
         return float(radii.min(initial=math.inf))
 
     @property
-    def _rates(self) -> Array:
-        """What a metre costs by each trim; inf by those that do not move."""
+    def _rates(self) -> Array:  # what a metre costs by each trim; inf by those that do not move
         automaton = self.planner.automaton
         twists = automaton.body_velocities
         speeds = np.hypot(twists[:, 0], twists[:, 1])
@@ -136,8 +137,7 @@ class FieldProblem:
         return np.asarray(np.divide(rates, speeds, out=metre, where=speeds > 0.0))
 
     @property
-    def _reach(self) -> float:
-        """How far [m] the body reaches from its pose; what it carries aside."""
+    def _reach(self) -> float:  # [m] of the body from its pose; what it carries aside
         return max(map(reach_of, self.planner.footprint), default=0.0)
 
     @property
@@ -150,11 +150,9 @@ class FieldProblem:
         """What swaths are to cover: the field without its headland, as geometry of shapely."""
         inner = self.whole
         for one in self.planner.obstacles:
-            assert isinstance(one, Obstacle)
-            if isinstance(one.shape, Disc):
-                inner -= shapely.Point(*one.shape.center).buffer(one.shape.radius)
-            else:
-                inner -= united(outlines(one.shape))
+            shape: Any = one.shape  # type: ignore[union-attr]  # each is an `Obstacle`
+            disc = isinstance(shape, Disc) and shapely.Point(*shape.center).buffer(shape.radius)
+            inner -= disc or united(outlines(shape))
         inner = inner.buffer(-self.headland, join_style="mitre")
         if inner.is_empty:
             room = shapely.maximum_inscribed_circle(self.whole).length
@@ -257,7 +255,13 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
     >>> len(done.swaths), done.covered, done.result.audit.passed
     (4, 1.0, True)
     """
-    planner, swaths = problem.inside, _swaths(problem)
+    planner, angles = problem.inside, [] if problem.direction is None else [problem.direction]
+    if not angles:
+        edges = np.roll(problem.shape.corners, -1, axis=0) - problem.shape.corners
+        longest = np.argsort(-np.round(np.linalg.norm(edges, axis=1), 6), kind="stable")
+        angles = np.arctan2(edges[longest, 1], edges[longest, 0])[:MOST_DIRECTIONS].tolist()
+    found = [_swaths_along(problem, angle) for angle in angles]
+    swaths = min(found, key=lambda one: (len(one), round(float(_lengths(one).sum()), 6)))
     both = np.stack([swaths, swaths[:, ::-1] + [0.0, 0.0, math.pi]], axis=1).reshape(-1, 2, 3)
     ends, begins, swath = both[:, None, 1], both[:, 0], np.arange(len(both)) // 2
     costs = problem._rates.min() * np.linalg.norm((ends - begins)[..., :2], axis=-1)  # at least
@@ -269,10 +273,9 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
         goals = [Goal(both[t, 0], trim=planner.start_trim) for _, t in wanted]
         starts = both[[s for s, _ in wanted], 1]
         turns = _turns(planner, starts, goals, time_limit=time_limit, jobs=jobs)
+        known |= zip(wanted, turns, strict=True)
         for pair, start, goal, turn in zip(wanted, starts, goals, turns, strict=True):
-            known[pair] = turn
-            asked = planner.problem(start, goal)
-            costs[pair] = np.inf if turn is None else asked.cost_of(turn)
+            costs[pair] = np.inf if turn is None else planner.problem(start, goal).cost_of(turn)
         order, bound = cheapest_order(costs)
         pairs = list(itertools.pairwise(order))
         wanted = [pair for pair in pairs if pair not in known]
@@ -285,17 +288,6 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
         turns_cost=sum(float(costs[pair]) for pair in pairs),
         order_bound=bound if planner.automaton.is_kinematic else None,
     )
-
-
-def _swaths(problem: FieldProblem) -> Array:
-    """Swaths (n, 2, 3) in the best direction, from one side to the other."""
-    if problem.direction is not None:
-        return _swaths_along(problem, problem.direction)
-    edges = np.roll(problem.shape.corners, -1, axis=0) - problem.shape.corners
-    longest = np.argsort(-np.round(np.linalg.norm(edges, axis=1), 6), kind="stable")
-    angles = np.arctan2(edges[longest, 1], edges[longest, 0])[:MOST_DIRECTIONS].tolist()
-    found = [_swaths_along(problem, angle) for angle in angles]
-    return min(found, key=lambda one: (len(one), round(float(_lengths(one).sum()), 6)))
 
 
 def _lengths(swaths: Array) -> Array:
@@ -336,10 +328,10 @@ def _turns(planner: Planner, starts: Array, goals: Sequence[Goal], **how: Any) -
         asked = planner.problem(start, goal)
         inside = turn and check_plan(asked, turn, goal, planner.workspace).passed
         found.append(turn if inside and not planner.place_costs else None)
-    if left := [k for k, turn in enumerate(found) if turn is None]:
-        among = planner.plan_many(starts[left], [goals[k] for k in left], **how)
-        for k, turn in zip(left, among, strict=True):
-            found[k] = turn
+    left = [k for k, turn in enumerate(found) if turn is None]
+    among = left and planner.plan_many(starts[left], [goals[k] for k in left], **how)
+    for k, turn in zip(left, among, strict=True):
+        found[k] = turn
     return found
 
 
@@ -377,3 +369,83 @@ def _as_one(
         clearance_m=found.audit.min_clearance_m,
         audit=found.audit,
     )
+
+
+def cheapest_order(costs: Array) -> tuple[list[int], float]:
+    """States in their order, and a cost that the turns of no order are below.
+
+    State 2 i + d is swath i in direction d; `costs` (2 n, 2 n) are those of the turn from the end
+    of one to the begin of another, inf where there is none.
+
+    Up to 12 swaths by dynamic programming over the sets of swaths driven. Beyond that from the
+    nearest next one on by reversals of a part and moves of a swath, until none gains, beside the
+    bound of an assignment: each swath has one next, or is the last.
+
+    Source: Held, Karp (1962), *A Dynamic Programming Approach to Sequencing Problems*; Croes
+    (1958), *A Method for Solving Traveling-Salesman Problems*.
+
+    Examples
+    --------
+    >>> far = np.full((4, 4), np.inf)
+    >>> far[2, 1] = 3.0  # from the second, driven forwards, to the first, driven backwards
+    >>> cheapest_order(far)
+    ([2, 1], 3.0)
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    there, n = np.isfinite(costs), len(costs) // 2
+    finite = np.where(there, costs, 1.0 + 2.0 * float(costs[there].sum()))  # more than all others
+    known = np.round(finite / finite.max(), DIGITS)
+    if n <= MOST_EXACT:
+        order = _by_sets(known)
+        return order, float(costs[order[:-1], order[1:]].sum())
+    tours = []
+    for first in range(2 * n):
+        order, left = [first], known.copy()
+        while len(order) < n:
+            left[:, [order[-1], order[-1] ^ 1]] = np.inf
+            order.append(int(np.argmin(left[order[-1]])))
+        tours.append((_price(known, np.array(order)), order))
+    _, best = min(_improved(known, *one) for one in sorted(tours)[:STARTS])
+    table = np.pad(finite.reshape(n, 2, n, 2).min(axis=(1, 3)), (0, 1))  # the last are the ends
+    table[n, n] = table.max()
+    return best, float(table[linear_sum_assignment(table)].sum())
+
+
+def _by_sets(costs: Array) -> list[int]:
+    """The cheapest of all orders, by the least cost to each set of swaths and last state."""
+    states = np.arange(len(costs))
+    bits, whole = 1 << states // 2, (1 << len(costs) // 2) - 1
+    best = np.full((whole + 1, len(costs)), np.inf)
+    before = np.full(best.shape, -1)
+    best[bits, states] = 0.0
+    for driven in range(1, whole):
+        after = states[(driven & bits) == 0]
+        through = best[driven][:, None] + costs[:, after]
+        before[driven | bits[after], after] = through.argmin(axis=0)
+        best[driven | bits[after], after] = through.min(axis=0)
+    order, driven = [int(np.argmin(best[whole]))], whole
+    while (last := int(before[driven, order[0]])) >= 0:
+        driven ^= int(bits[order[0]])
+        order.insert(0, last)
+    return order
+
+
+def _improved(costs: Array, price: float, order: list[int]) -> tuple[float, list[int]]:
+    """The price of an order that no reversal of a part and no move of one swath makes cheaper."""
+    states, n, before = np.array(order), len(order), np.inf
+    while price < before:
+        before = price
+        for i, j in itertools.combinations(range(n + 1), 2):
+            turned = np.concatenate([states[:i], states[i:j][::-1] ^ 1, states[j:]])
+            if (less := _price(costs, turned)) < price:
+                states, price = turned, less
+        for i, j, flip in itertools.product(range(n), range(n), (0, 1)):
+            moved = np.insert(np.delete(states, i), j, states[i] ^ flip)
+            if (less := _price(costs, moved)) < price:
+                states, price = moved, less
+    return price, states.tolist()
+
+
+def _price(costs: Array, order: IntArray) -> float:
+    return round(float(costs[order[:-1], order[1:]].sum()), DIGITS)

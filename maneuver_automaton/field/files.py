@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from pydantic import Field
 from maneuver_automaton._brief import brief
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.earth import metres_of
-from maneuver_automaton.exports.geojson import save_features
+from maneuver_automaton.exports.geojson import feature_of, geometry_of, save_features
 from maneuver_automaton.field.covering import FieldProblem, FieldResult
 from maneuver_automaton.formats.statement import simple_polygon
 from maneuver_automaton.formats.text_source import read_text
@@ -69,14 +68,14 @@ def load_field(
     InvalidScenario
         If a file cannot be read or used.
     """
-    is_geojson = path.suffix.lower() in (".geojson", ".json")
+    is_geojson, at = path.suffix.lower() in (".geojson", ".json"), ("field",)
     if is_geojson == (beside is None):
         wrong = "GeoJSON states no vehicle, need" if is_geojson else "states its vehicle; leave out"
         raise InvalidScenario(f"{path}: {wrong} --with")
     document = parse(read_text(beside or path), name=str(beside or path))
     if not isinstance(document.value, dict):
         raise document.error((), "is no mapping, need a scenario with the key 'field'")
-    rest, part, at = dict(document.value), FieldPart(), ("field",)
+    rest, part = dict(document.value), FieldPart()
     if "field" in rest:
         if ends := {"start", "goal"} & set(rest):
             raise document.error((min(ends),), "is for plan; a field has none, leave it out")
@@ -140,20 +139,13 @@ def save_field_geojson(
     covered: FieldResult, path: Path, *, name: str, origin: tuple[float, float] | None = None
 ) -> None:
     """Write field, inner part, swaths and turns as GeoJSON: `kind` tells them apart."""
-    save_features(_features(covered), path, name=name, origin=origin)
-
-
-def _features(covered: FieldResult) -> Iterator[dict[str, Any]]:
     problem = covered.problem
-
-    def feature(geometry: Any, kind: str, **facts: Any) -> dict[str, Any]:
-        drawn = json.loads(shapely.to_geojson(geometry))
-        return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": drawn}
-
-    yield feature(shapely.orient_polygons(problem.whole), "field")
-    yield feature(shapely.orient_polygons(problem.inner), "inner", headland_m=problem.headland)
+    found: list[tuple[Any, dict[str, Any]]] = [(problem.whole, {"kind": "field"})]
+    found += [(problem.inner, {"kind": "inner", "headland_m": problem.headland})]
     for k, line in enumerate(shapely.linestrings(covered.swaths[:, :, :2])):
-        yield feature(line, "swath", number=k + 1, width_m=problem.width)
+        found += [(line, {"kind": "swath", "number": k + 1, "width_m": problem.width})]
     for k, turn in enumerate(covered.turns):
         line = shapely.LineString(turn.sample().pose[:, :2])
-        yield feature(line, "turn", number=k + 1, duration_s=turn.duration)
+        found += [(line, {"kind": "turn", "number": k + 1, "duration_s": turn.duration})]
+    features = (feature_of(geometry_of(one), **facts) for one, facts in found)
+    save_features(features, path, name=name, origin=origin)

@@ -8,11 +8,10 @@ import shapely
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Patch, PathPatch
 
-from maneuver_automaton.collision import Polygon
 from maneuver_automaton.field.covering import FieldResult
 from maneuver_automaton.plotting import Look, draw_obstacles
 from maneuver_automaton.plotting.colors import SEQUENCE
-from maneuver_automaton.plotting.obstacles import shape_path
+from maneuver_automaton.plotting.obstacles import region_path, shape_path
 from maneuver_automaton.plotting.pages import page_of, write_figure
 from maneuver_automaton.plotting.style import line_handle, mark_handle
 
@@ -37,10 +36,8 @@ def save_field_picture(covered: FieldResult, path: Path, *, name: str) -> None:
         shape=float((high - low)[0] / (high - low)[1]),
     )  # fmt: skip
     for area, color in ((problem.whole, soil), (covered.strips & problem.whole, green)):
-        for part in shapely.get_parts(area):
-            page.plane.add_patch(
-                PathPatch(shape_path(Polygon(part)), facecolor=color, linewidth=0.0)
-            )
+        parts = region_path(shapely.get_parts(area))
+        page.plane.add_patch(PathPatch(parts, facecolor=color, linewidth=0.0))
     page.plane.add_patch(PathPatch(shape_path(problem.shape), facecolor="none", linewidth=1.2))
     draw_obstacles(page.plane, problem.planner.obstacles)
     turns = [turn.sample().pose[:, :2] for turn in covered.turns]

@@ -16,7 +16,8 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.place_arrays import FORBIDDEN
 
-MOST_CELLS = 20_000  # of the grid that a way is found on
+CELLS, MOST_CELLS = 20_000, 200_000  # of the grid that a way is found on: at first, at last
+NARROW = 1.1  # times what a way costs at the least rate of each cell, above which cells are halved
 STEPS = [(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1]  # 16 ways on
 WIDE = 3.0  # half widths of a corridor, in length scales of the vehicle
 COSTLIER = 1.1  # times what a metre costs on the way
@@ -25,24 +26,33 @@ COSTLIER = 1.1  # times what a metre costs on the way
 def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     """Problems with all closed but a corridor along the cheapest way of a point, where ends allow.
 
-    The way leads over cells of a grid, each at what its place costs under the heading of a step,
-    and at the invariant cost of a metre. What costs more than the way beside it is closed, too, but
-    for around the ends: in the second problem from a length scale on, in the last not at all. In
-    the first nothing has a price for a vehicle with maneuvers. There is none where none is sampled:
-    near obstacles nothing costs more than elsewhere.
+    The way leads over cells of a grid, halved while that may pay, each at what its place costs
+    under the heading of a step, and at the invariant cost of a metre. What costs more than the way
+    beside it is closed, too, but for around the ends: in the second problem from a length scale on,
+    in the last not at all. In the first nothing has a price for a vehicle with maneuvers. There is
+    none where none is sampled: near obstacles nothing costs more than elsewhere.
     """
     from scipy import ndimage
 
     place, library = query.around.place, query.library
     if not place.value.size:
         return
-    rates = _rates_ahead(query)
-    every = max(1, math.ceil(math.sqrt(rates[0].size / MOST_CELLS)))
-    rates, cell = rates[:, ::every, ::every] + library.per_metre, every * place.cell
+    whole = _rates_ahead(query) + library.per_metre
+    every, finest = (math.ceil(math.sqrt(whole[0].size / most)) for most in (CELLS, MOST_CELLS))
     low = np.array([place.origin_x, place.origin_y])
-    ends = np.rint((np.vstack([query.start, *query.goals])[:, :2] - low) / cell).astype(np.int64)
-    ends = np.clip(ends, 0, np.array(rates.shape[:0:-1]) - 1)
-    way, least = _cheapest_way(rates, ends), rates.min(axis=0)
+    places = np.vstack([query.start, *query.goals])[:, :2] - low
+    while True:
+        rates, cell = whole[:, ::every, ::every], every * place.cell
+        ends = np.rint(places / cell).astype(np.int64)
+        ends = np.clip(ends, 0, np.array(rates.shape[:0:-1]) - 1)
+        cost, way = _cheapest_way(rates, ends)
+        if every <= finest:
+            break
+        around = ndimage.minimum_filter(whole, (1, every, every))[:, ::every, ::every]
+        if cost <= NARROW * _cheapest_way(around, ends)[0]:
+            break
+        every = max(finest, every // 2)
+    least = rates.min(axis=0)
     aside, out = np.ones(least.shape, dtype=np.bool_), np.ones(least.shape, dtype=np.bool_)
     aside[tuple(way.T)], out[ends[:, 1], ends[:, 0]] = False, False
     far, (i, j) = ndimage.distance_transform_edt(aside, return_indices=True)
@@ -80,8 +90,8 @@ def _rates_ahead(query: LatticeQuery) -> Array:
     return np.asarray(rates)
 
 
-def _cheapest_way(rates: Array, ends: IntArray) -> IntArray:
-    """Cells (n, 2) row and column from the first of some ends (x, y) to the cheapest other."""
+def _cheapest_way(rates: Array, ends: IntArray) -> tuple[float, IntArray]:
+    """Cost in cells, and cells (n, 2) row and column, from the first end (x, y) to another."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
@@ -100,4 +110,4 @@ def _cheapest_way(rates: Array, ends: IntArray) -> IntArray:
     cells = [min(goals, key=lambda goal: float(value[goal]))]
     while cells[-1] != begin:
         cells.append(int(before[cells[-1]]))
-    return np.column_stack(np.divmod(cells, columns))
+    return float(value[cells[0]]), np.column_stack(np.divmod(cells, columns))

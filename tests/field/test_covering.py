@@ -10,8 +10,7 @@ import shapely
 
 import maneuver_automaton as ma
 from maneuver_automaton.collision.shapes import Polygon
-from maneuver_automaton.field.covering import _swaths_along
-from maneuver_automaton.field.ordering import cheapest_order
+from maneuver_automaton.field.covering import _swaths_along, cheapest_order
 from tests.field.cases import BODY, CAR, FORWARDS, OBLONG, oblong, pond, tractor
 
 BOTH = pytest.mark.parametrize("covered", [oblong, pond])
