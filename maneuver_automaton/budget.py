@@ -131,7 +131,7 @@ class Budget:
 
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""
-        return replace(self, deadline=self.deadline - seconds)
+        return replace(self, deadline=self.deadline - seconds) if seconds else self
 
     def less(self, spent: int) -> Budget:
         """The budget that remains after so many expansions."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import by_value
 
 BLOCK = 16  # edges in a box of several
 SPARE = 1e-6  # [m] that nothing is left out for rounding
@@ -88,3 +89,38 @@ class Spans(NamedTuple):
     def of(self, rows: Any) -> Spans:
         """Some of them, by number, slice or truth."""
         return Spans(self.element[rows], self.begin[rows], self.end[rows])
+
+
+class Stated(NamedTuple):
+    """Stretches in order; what the plan states of them is compared, and never driven from."""
+
+    lengths: Array  # (n,) [s]
+    controls: Array  # (n, n_u)
+    states: Array  # (n, n_z) reduced states where they begin
+    end_states: Array  # (n, n_z)
+    ends: Array  # (n, dof) poses where they end
+    twists: Array  # (n, dof) of trims; NaN along maneuvers
+    pieces: IntArray  # (n,) number of the primitive
+
+
+@by_value
+class TimeElements(NamedTuple):
+    """How stretches are cut: an element is a run of stretches, or a part of one."""
+
+    first: IntArray  # (e,) stretch in which each begins
+    share: Array  # (e,) of that stretch, that has passed then
+    lengths: Array  # (e,) [s]
+    runs: IntArray  # (e,) number of the run
+    run: IntArray  # (n,) number of the run of each stretch
+
+
+@by_value
+class Ended(NamedTuple):
+    """Where a drive is when stretches end, and how far off what is stated of it is."""
+
+    time: Array  # (n,) [s]
+    element: IntArray  # (n,)
+    share: Array  # (n,) of the element; more than 1 by rounding alone
+    poses: Array  # (n, dof)
+    off: float  # [m, rad] at most, of poses and along elements
+    turned: float  # [rad] the same, of the headings alone

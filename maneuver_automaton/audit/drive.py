@@ -6,7 +6,7 @@ Nothing of what made the plan is used: no group formula, no closed form, no pose
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.arrays import Spans
+from maneuver_automaton.audit import _kernels_drive as kernels
+from maneuver_automaton.audit.arrays import Spans, Stated, TimeElements
 from maneuver_automaton.audit.frames import (
     INTEGRAL,
+    RULES,
     SERIES,
+    SLOPE,
     TO_END,
     TO_NODES,
     FrameMotion,
     N,
-    frames_along,
-    frames_through,
     placed,
     values_at,
 )
@@ -64,7 +65,7 @@ class DrivenPlan:
         """The frame of what the vehicle carries, placed by the model from the reduced state."""
         which = self.model.part_names.index(name)
         seen = np.asarray(self.model.part_poses(self.states), dtype=np.float64)[..., which, :]
-        return frames_through(placed(self.frames.nodes, seen), self.frames)
+        return _frames_through(placed(self.frames.nodes, seen), self.frames)
 
     def twists_at(self, elements: IntArray, shares: Array) -> Array:
         """Twists (m, dof) at shares of elements, (m,) each."""
@@ -93,16 +94,6 @@ class DrivenPlan:
         return Spans(element, *shares), self.pieces[piece]
 
 
-class _Elements(NamedTuple):
-    """How stretches are cut: an element is a run of stretches, or a part of one."""
-
-    first: IntArray  # (e,) stretch in which each begins
-    share: Array  # (e,) of that stretch, that has passed then
-    lengths: Array  # (e,) [s]
-    runs: IntArray  # (e,) number of the run
-    run: IntArray  # (n,) number of the run of each stretch
-
-
 def driven(plan: Plan, model: Model) -> DrivenPlan:
     """Drive a plan again from its start under its controls.
 
@@ -120,8 +111,8 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     parts = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
     alone = parts > 1
     for _ in range(HALVINGS):
-        elements = _cut(stated, turns, parts, alone)
-        found = _integrated(plan.start, model, stated, elements)
+        elements = kernels.cut(stated, turns, parts, alone, TURN)
+        found = _integrated(plan.start, model, stated, elements, begin_twists)
         last = np.maximum(found.reduced.error, found.frames.error)
         rough = ~(last <= EXACT * (1.0 + found.frames.length))
         if not rough.any():
@@ -132,41 +123,31 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     return _compared(plan, model, stated, elements, found)
 
 
-def _cut(stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_]) -> _Elements:
-    """Runs of one control within a primitive that turn by no more than `TURN`, or equal parts."""
-    controls, pieces = stated.controls, stated.pieces
-    turned = np.floor((np.cumsum(turns) - turns) / TURN)
-    breaks = np.ones(pieces.size, dtype=np.bool_)
-    breaks[1:] = (pieces[1:] != pieces[:-1]) | alone[1:] | alone[:-1] | (turned[1:] != turned[:-1])
-    breaks[1:] |= (controls[1:] != controls[:-1]).any(axis=1)
-    run = np.cumsum(breaks) - 1
-    begins = np.flatnonzero(breaks)
-    count = parts[begins]
-    of = np.repeat(np.arange(begins.size), count)
-    number = np.arange(of.size) - (np.cumsum(count) - count)[of]
-    lengths = np.add.reduceat(stated.lengths, begins) / count
-    return _Elements(begins[of], number / count[of], lengths[of], of, run)
-
-
 class _Integrated(NamedTuple):
     reduced: Reduced
     twists: Array  # (e, N, dof) at the nodes
     frames: FrameMotion
 
 
-def _integrated(start: Array, model: Model, stated: Stated, elements: _Elements) -> _Integrated:
+def _integrated(
+    start: Array, model: Model, stated: Stated, elements: TimeElements, begin_twists: Array
+) -> _Integrated:
     """Reduced states on all elements, then the poses."""
     first, share = elements.first, elements.share[:, None]
     guess = stated.states[first] + share * (stated.end_states[first] - stated.states[first])
     controls = stated.controls[first]
     reduced = reduced_states(model, controls, elements.lengths, guess, elements.share == 0.0)
     twists = np.empty((first.size, N, start.size))
-    twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
-    return _Integrated(reduced, twists, frames_along(start, twists, elements.lengths))
+    twists[:] = begin_twists[first, None]  # of a vehicle without a state, all along
+    if guess.shape[1]:
+        twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
+    return _Integrated(
+        reduced, twists, kernels.motion_along(start.copy(), twists, elements.lengths, RULES)
+    )
 
 
 def _compared(
-    plan: Plan, model: Model, stated: Stated, elements: _Elements, found: _Integrated
+    plan: Plan, model: Model, stated: Stated, elements: TimeElements, found: _Integrated
 ) -> DrivenPlan:
     """The drive, and the greatest difference to what the plan states of it."""
     reduced, frames = found.reduced, found.frames
@@ -174,39 +155,41 @@ def _compared(
     has_states = bool(reduced.series.shape[2])
     if has_states:
         doubt = reduced.error + reduced.jumps / reduced.error.size
-        frames = replace(frames, error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
-    ends = np.cumsum(stated.lengths)
-    at = np.searchsorted(elements.first, np.arange(ends.size), side="right") - 1
-    share = np.maximum((ends - frames.times[at]) / elements.lengths[at], 0.0)
-    inner = np.flatnonzero(share < 1.0)
-    poses, states = frames.series.sum(axis=1)[at], reduced.series.sum(axis=1)[at]
-    if inner.size:
-        poses[inner] = frames.at(at[inner], share[inner])
-    if inner.size and has_states:
-        states[inner] = values_at(reduced.series[at[inner]], share[inner])
-    off_poses = np.abs(poses - stated.ends)
-    off_twists = np.abs(found.twists - stated.twists[elements.first][:, None])
-    off_twists *= elements.lengths[:, None, None]
-    # Of the twists of maneuvers nothing is stated: those are not numbers, and do not count.
-    off = np.maximum(off_poses.max(), np.fmax.reduce(off_twists, axis=None, initial=0.0))
+        frames = frames._replace(error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
+    there = kernels.compared(stated, elements, frames, found.twists)
+    off, states = there.off, stated.end_states
     if has_states:
-        off = np.maximum(off, np.abs(states - stated.end_states).max())
+        states = values_at(reduced.series[there.element], np.minimum(there.share, 1.0))
         begun_anew = np.abs(states[:-1] - stated.states[1:]).max(initial=0.0)
-        off = np.maximum(off, begun_anew)
+        off = float(np.max([off, np.abs(states - stated.end_states).max(), begun_anew]))
     return DrivenPlan(
         plan=plan,
         model=model,
         frames=frames,
         twists=found.twists,
         states=reduced.nodes,
-        end=poses[-1],
-        off=float(off) + reduced.jumps,
-        turned=float(off_poses[:, 2].max()),
-        ends=ends,
+        end=there.poses[-1],
+        off=off + reduced.jumps,
+        turned=there.turned,
+        ends=there.time,
         pieces=stated.pieces,
         controls=stated.controls,
         sampled_states=np.concatenate([stated.states[:1], states]),
     )
+
+
+def _frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
+    """Of what is at poses (e, N, dof) at the nodes of the elements of other frames."""
+    poses[..., 2] = np.unwrap(poses[..., 2], axis=1)
+    series = SERIES @ poses
+    lengths = np.diff(like.times)
+    rates = SLOPE @ poses / lengths[:, None, None]
+    cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    twists = rates.copy()
+    twists[..., 0] = cosine * rates[..., 0] + sine * rates[..., 1]
+    twists[..., 1] = cosine * rates[..., 1] - sine * rates[..., 0]
+    last = like.error + np.abs(series[:, -2:]).max(axis=(1, 2))
+    return kernels.bounded(lengths, series, poses, twists, last, RULES)
 
 
 def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
@@ -217,7 +200,7 @@ def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
     return DrivenPlan(
         plan=plan,
         model=model,
-        frames=frames_along(plan.start, still, np.full(1, NOTHING)),
+        frames=kernels.motion_along(plan.start.copy(), still, np.full(1, NOTHING), RULES),
         twists=still,
         states=np.tile(states, (1, N, 1)),
         end=plan.start,
@@ -230,24 +213,15 @@ def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
     )
 
 
-class Stated(NamedTuple):
-    """Stretches in order; what the plan states of them is compared, and never driven from."""
-
-    lengths: Array  # (n,) [s]
-    controls: Array  # (n, n_u)
-    states: Array  # (n, n_z) reduced states where they begin
-    end_states: Array  # (n, n_z)
-    ends: Array  # (n, dof) poses where they end
-    twists: Array  # (n, dof) of trims; NaN along maneuvers
-    pieces: IntArray  # (n,) number of the primitive
-
-
 def stated_by(plan: Plan) -> Stated:
     """The stretches of a plan: trims whole, maneuvers from sample to sample."""
     poses, lengths = plan.switching_poses, plan.primitive_durations
+    lasting = np.flatnonzero(lengths > NOTHING)
+    if not any(plan.maneuvers) and lasting.size:
+        trims = [plan.trims[k] for k in lasting.tolist()]
+        return _trims(trims, lasting, lengths[lasting], poses[lasting + 1])
     rows: list[Stated] = []
     # Trims that follow each other are one run; every maneuver stands alone.
-    lasting = np.flatnonzero(lengths > NOTHING)
     for _, run in groupby(
         lasting.tolist(), key=lambda k: -1 if isinstance(plan.primitives[k], Trim) else k
     ):

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leg2poly, leggauss, legvander
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import by_value
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FrameMotion:
+@by_value
+class FrameMotion(NamedTuple):
     """Poses (x, y, heading(, altitude)) over time, exact at the nodes and between them.
 
     What it does at most holds at every instant of an element, not only at the nodes: the terms of
@@ -22,7 +23,7 @@ class FrameMotion:
     series: Array  # (e, n, dof) Legendre series over the share of an element
     nodes: Array  # (e, N, dof) poses at the nodes
     speed: Array  # (e,) [m/s] of the origin at most
-    turn: Array  # (e,) [rad/s]
+    turn: Array  # (e,) [rad/s] at most
     bend: Array  # (e,) [m/s^2] how fast the velocity changes
     swerve: Array  # (e,) [1/s^2] what is added for each metre from the origin
     rise: Array  # (e,) [m/s^2] how fast the climb rate changes
@@ -43,40 +44,6 @@ class FrameMotion:
         return float(self.error.sum()) * (1.0 + self.length)
 
 
-def frames_along(start: Array, twists: Array, lengths: Array) -> FrameMotion:
-    """From a pose (dof,), under twists (e, N, dof) at the nodes of elements of lengths (e,) [s].
-
-    The heading is the integral of the turn rate, the place that of the velocity seen with it.
-    """
-    h = lengths[:, None]
-    heading = start[2] + _before(h[:, 0] * (twists[..., 2] @ TO_END))[:-1, None]
-    heading = heading + h * (twists[..., 2] @ TO_NODES.T)
-    cosine, sine = np.cos(heading), np.sin(heading)
-    rates = twists.copy()
-    rates[..., 0] = cosine * twists[..., 0] - sine * twists[..., 1]
-    rates[..., 1] = sine * twists[..., 0] + cosine * twists[..., 1]
-    series = h[..., None] * (INTEGRAL @ rates)
-    begins = start + _before(series.sum(axis=1))
-    series[:, 0] += begins[:-1]
-    nodes = begins[:-1, None] + h[..., None] * (TO_NODES @ rates)
-    last = np.abs(SERIES[-2:] @ rates).max(axis=(1, 2)) * lengths
-    return _bounded(lengths, series, nodes, twists, last)
-
-
-def frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
-    """Of what is at poses (e, N, dof) at the nodes of the elements of other frames."""
-    poses[..., 2] = np.unwrap(poses[..., 2], axis=1)
-    series = SERIES @ poses
-    lengths = np.diff(like.times)
-    rates = SLOPE @ poses / lengths[:, None, None]
-    cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    twists = rates.copy()
-    twists[..., 0] = cosine * rates[..., 0] + sine * rates[..., 1]
-    twists[..., 1] = cosine * rates[..., 1] - sine * rates[..., 0]
-    last = like.error + np.abs(series[:, -2:]).max(axis=(1, 2))
-    return _bounded(lengths, series, poses, twists, last)
-
-
 def placed(frames: Array, seen: Array) -> Array:
     """Poses (..., dof) that are `seen` (..., 3 or more) from frames (..., dof), in the world."""
     cosine, sine = np.cos(frames[..., 2]), np.sin(frames[..., 2])
@@ -84,34 +51,6 @@ def placed(frames: Array, seen: Array) -> Array:
     planar = [cosine * x - sine * y, sine * x + cosine * y, seen[..., 2]]
     higher = [seen[..., k] if k < seen.shape[-1] else 0.0 * x for k in range(3, frames.shape[-1])]
     return np.asarray(frames + np.stack(np.broadcast_arrays(*planar, *higher), axis=-1))
-
-
-def _bounded(
-    lengths: Array, series: Array, nodes: Array, twists: Array, error: Array
-) -> FrameMotion:
-    terms = np.abs(SERIES @ twists)  # (e, N, dof)
-    most = terms.sum(axis=1)
-    change = SLOPES @ terms / lengths[:, None]
-    speed, turn = np.hypot(most[:, 0], most[:, 1]), most[:, 2]
-    return FrameMotion(
-        times=_before(lengths),
-        series=series,
-        nodes=nodes,
-        speed=speed,
-        turn=turn,
-        bend=np.hypot(change[:, 0], change[:, 1]) + turn * speed,
-        swerve=change[:, 2] + turn * turn,
-        rise=change[:, 3:].sum(axis=1),
-        error=error,
-        length=float(speed @ lengths),
-    )
-
-
-def _before(steps: Array) -> Array:
-    """Sums (n + 1, ...) of the steps before each, and of all."""
-    sums = np.zeros((len(steps) + 1, *steps.shape[1:]))
-    np.cumsum(steps, axis=0, out=sums[1:])
-    return sums
 
 
 N = 12  # nodes: over a radian, a cosine is exact to rounding between them too
@@ -150,6 +89,18 @@ def _slopes() -> Array:
 
 
 SLOPE: Array = _slopes()
+
+
+class Collocation(NamedTuple):
+    """What the kernels take of these."""
+
+    integral: Array
+    to_nodes: Array
+    series: Array
+    slopes: Array
+
+
+RULES = Collocation(INTEGRAL, TO_NODES, np.ascontiguousarray(SERIES), SLOPES)
 
 # Terms as sums of powers: those of high degree, whose factors are large, are tiny where it counts.
 _POWERS: Array = np.array([np.pad(leg2poly(row), (0, N - k)) for k, row in enumerate(_unit)])

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
@@ -103,9 +103,11 @@ def seen_from(plan: Plan, goal: Goal) -> Plan:
 
 def distance_to(end: Array, goal: Goal) -> TerminalError:
     """How far a pose (dof,), counted from the goal's place, is from the goal."""
-    places = [0, 1, *range(3, end.size)]
-    heading = 0.0 if goal.free_heading else float(abs(wrapped(end[2] - goal.pose[2])))
-    return TerminalError(position_m=float(np.linalg.norm(end[places])), heading_rad=heading)
+    x, y, heading, *higher = end.tolist()
+    turned = 0.0
+    if not goal.free_heading:
+        turned = abs((heading - float(goal.pose[2]) + math.pi) % (2.0 * math.pi) - math.pi)
+    return TerminalError(position_m=math.hypot(x, y, *higher), heading_rad=turned)
 
 
 def audit_plan(
@@ -392,6 +394,8 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
         (model.reduced_names, model.reduced_limits, drive.sampled_states),
         (model.control_names, model.control_limits, drive.controls),
     ):
+        if not names:
+            continue
         most, least = values.max(axis=0).tolist(), values.min(axis=0).tolist()
         rows = zip(names, limits.tolist(), most, least, strict=True)
         for name, (low, high), greatest, smallest in rows:

@@ -109,11 +109,13 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         centers = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
         found.append((numbers, centers, centers, np.array([one.radius for _, one in discs])))
     if polygons:
+        rings = [(k, [one.corners - origins[k]]) for k, one in polygons if one.is_plain]
+        others = [(k, one) for k, one in polygons if not one.is_plain]
         given = [
             (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
-            for k, one in polygons
+            for k, one in others
         ]
-        rings = [*zip([k for k, _ in polygons], _solid_rings(given), strict=True)]
+        rings += zip([k for k, _ in others], _solid_rings(given), strict=True)
         numbers = np.repeat([k for k, _ in rings], [sum(map(len, some)) for _, some in rings])
         both = _edges([ring for _, some in rings for ring in some])
         found.append((numbers, *both, np.zeros(numbers.size)))
@@ -143,6 +145,8 @@ def _solid_rings(polygons: Sequence[tuple[Array, Sequence[Array]]]) -> Iterator[
     """
     import shapely
 
+    if not polygons:
+        return
     corners = [ring for ring, _ in polygons]
     numbers = np.repeat(np.arange(len(corners)), [len(ring) for ring in corners])
     rings = shapely.linearrings(np.concatenate(corners), indices=numbers)

@@ -242,7 +242,7 @@ class Plan(Played):
         """Names of the primitives, in order."""
         return tuple(primitive.name for primitive in self.primitives)
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Time the plan takes [s], rest included."""
         return float(self.primitive_durations.sum())

@@ -41,13 +41,6 @@ def from_segment(
 
 
 @bare_inner_kernel
-def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Squared distance of a point to a segment."""
-    ex, ey = from_segment(x, y, ax, ay, bx, by)
-    return ex * ex + ey * ey
-
-
-@bare_inner_kernel
 def separation(
     body: Body | SweptAreas,
     b: int,

@@ -9,54 +9,60 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
-from maneuver_automaton.collision._kernels_clearance import point_to_segment
 from maneuver_automaton.collision.arrays import Buckets, Field, Place
 from maneuver_automaton.collision.convex import Solids
 
 
-@inner_kernel
-def distance_to_piece(x: float, y: float, corners: Array, first: int, last: int) -> float:
-    """Distance of a point to a convex polygon, its corners counter-clockwise; negative inside."""
-    best = math.inf
-    # A point is inside if it is on the left of every edge; a line and a disc's middle have no
-    # inside.
-    inside = last - first > 2
-    before = last - 1
-    for k in range(first, last):
-        a_x, a_y = corners[before, 0], corners[before, 1]
-        b_x, b_y = corners[k, 0], corners[k, 1]
-        best = min(best, point_to_segment(x, y, a_x, a_y, b_x, b_y))
-        inside = inside and (b_x - a_x) * (y - a_y) - (b_y - a_y) * (x - a_x) >= 0.0
-        before = k
-    return -math.sqrt(best) if inside else math.sqrt(best)
-
-
 @kernel
 def write_pieces(field: Field, solids: Solids, n: int) -> None:
-    """Lower the distances of a field to those of each of the first `n` solids."""
-    distance, cell, cap = field.distance, field.cell, field.outside
-    origin_x, origin_y = field.origin_x, field.origin_y
+    """Lower the distances of a field to those of each of the first `n` solids.
+
+    They are negative inside a convex polygon, whose corners are counter-clockwise.
+    """
+    cell, cap = field.cell, field.outside
     edges, first, plates = solids.edges, solids.first, solids.plates
-    rows, columns = distance.shape
+    rows, columns = field.distance.shape
+    xs = field.origin_x + (np.arange(columns) + 0.5) * cell
+    # Of the cells of a row: the squared distance to the nearest edge so far, and how far they are
+    # to the left of all edges. Loops over slices are compiled to several cells at once, with a
+    # division each; to skip some of them would take longer.
+    squares, lefts = np.empty(columns), np.empty(columns)
     for p in range(n):
-        i_0 = max(0, int((plates[p, 0] - cap - origin_x) / cell))
-        i_1 = min(columns, int((plates[p, 2] + cap - origin_x) / cell) + 1)
-        j_0 = max(0, int((plates[p, 1] - cap - origin_y) / cell))
-        j_1 = min(rows, int((plates[p, 3] + cap - origin_y) / cell) + 1)
+        low, high, rounding = plates[p, 0], plates[p, 2], plates[p, 4]
+        i_0 = max(0, int((low - cap - field.origin_x) / cell))
+        i_1 = min(columns, int((high + cap - field.origin_x) / cell) + 1)
+        j_0 = max(0, int((plates[p, 1] - cap - field.origin_y) / cell))
+        j_1 = min(rows, int((plates[p, 3] + cap - field.origin_y) / cell) + 1)
+        x, square, left = xs[i_0:i_1], squares[i_0:i_1], lefts[i_0:i_1]
         for j in range(j_0, j_1):
-            y = origin_y + (j + 0.5) * cell
+            y = field.origin_y + (j + 0.5) * cell
             d_y = max(max(plates[p, 1] - y, y - plates[p, 3]), 0.0)
-            for i in range(i_0, i_1):
-                x = origin_x + (i + 0.5) * cell
-                d_x = max(max(plates[p, 0] - x, x - plates[p, 2]), 0.0)
-                # The box around the piece bounds its distance from below: where another piece is
-                # nearer than the box already, the corners are not looked at.
-                known = max(distance[j, i], 0.0)
-                if d_x * d_x + d_y * d_y > known * known:
-                    continue
+            square[:] = math.inf
+            # A line and a disc's middle have no inside.
+            left[:] = math.inf if first[p + 1] - first[p] > 2 else -1.0
+            before = first[p + 1] - 1
+            for k in range(first[p], first[p + 1]):
+                a_x, to_y = edges[before, 0], y - edges[before, 1]
+                e_x, e_y = edges[k, 0] - a_x, edges[k, 1] - edges[before, 1]
+                length = e_x * e_x + e_y * e_y
+                length = length if length > 0.0 else math.inf  # its first end is the nearest point
+                for i in range(x.size):
+                    to_x = x[i] - a_x
+                    share = min(max((to_x * e_x + to_y * e_y) / length, 0.0), 1.0)
+                    off_x, off_y = to_x - share * e_x, to_y - share * e_y
+                    square[i] = min(square[i], off_x * off_x + off_y * off_y)
+                    left[i] = min(left[i], e_x * to_y - e_y * to_x)
+                before = k
+            row = field.distance[j, i_0:i_1]
+            for i in range(x.size):
                 # Rounded by its radius, a piece is nearer by as much.
-                value = distance_to_piece(x, y, edges, first[p], first[p + 1]) - plates[p, 4]
-                distance[j, i] = min(distance[j, i], value)
+                apart = math.sqrt(square[i])
+                value = (-apart if left[i] >= 0.0 else apart) - rounding
+                # The box around the piece bounds its distance from below: where another piece is
+                # nearer than the box already, rounding decides nothing.
+                d_x, known = max(max(low - x[i], x[i] - high), 0.0), max(row[i], 0.0)
+                away = d_x * d_x + d_y * d_y
+                row[i] = row[i] if away > known * known else min(row[i], value)
 
 
 @inner_kernel

@@ -199,15 +199,16 @@ class FclChecker:
         """The first of some coasts that touches a static obstacle, and which."""
         if laid.static is None:
             return None
-        speeds = point_speeds(twists, np.concatenate(self._body.pieces)).max(axis=1)
-        moving = speeds * durations > STANDING
-        standing = np.flatnonzero(~moving)
+        kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
+        coasts = list(zip(kinds, durations.tolist(), strict=True))
+        for k, (kind, time) in enumerate(coasts):
+            if _speed(self._body, kind) * time <= STANDING:
+                coasts[k] = kind, 0.0
+        standing = np.array([k for k, (_, time) in enumerate(coasts) if not time], dtype=np.int64)
         first = self._first_pose_hit(starts[standing], standing, laid)
-        lasting = np.where(moving, _once_round(twists[:, 2], durations), 0.0)
-        parts = windows(twists[:, 2], lasting)
+        parts = windows(coasts)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
-        kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
 
         def posed(of: IntArray, times: Array) -> Array:
             return after(starts[of], displacements(twists[of], times))
@@ -274,8 +275,9 @@ class _Ground:
         laid = self.laid
         if laid.rows.all():
             return laid
-        low, high = self.boxes[:, None, :2], self.boxes[:, None, 2:]
-        meets = np.all((low <= boxes[:, 2:]) & (high >= boxes[:, :2]), axis=-1)
+        low_x, low_y, high_x, high_y = self.boxes.T[:, :, None]
+        meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
+        meets &= (high_x >= boxes[:, 0]) & (high_y >= boxes[:, 1])
         rows = laid.rows | meets.any(axis=1)
         if not (rows & ~laid.rows).any():
             return laid
@@ -336,7 +338,7 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
         begins = np.cumsum(sizes) - sizes
         ends = [np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)]
         boxes[[k for k, _ in polygons]] = np.concatenate(ends, axis=1)
-        outlines_of([one for _, one in polygons])  # refuses one without area
+        outlines_of([one for _, one in polygons if not one.is_plain])  # refuses one without area
     return boxes
 
 
@@ -344,6 +346,12 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
 def _standing(body: GrownBody) -> Any:
     """The body at rest."""
     return _object(body_skin(body.pieces))
+
+
+@functools.lru_cache(maxsize=1024)
+def _speed(body: GrownBody, twist: Twist) -> float:
+    """The speed [m/s] that no point of a body exceeds."""
+    return float(point_speeds(np.array([twist]), np.concatenate(body.pieces)).max())
 
 
 @functools.lru_cache(maxsize=1024)
@@ -368,16 +376,11 @@ def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Arr
 
     From each place the ways to both ends are together no longer than the coast: an ellipse.
     """
-    lasting = _once_round(twists[:, 2], durations)
+    lasting = np.minimum(durations, math.tau / np.maximum(np.abs(twists[:, 2]), LEAST_TURN))
     begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
     ends = after(starts, displacements(twists, lasting))[:, :2]
     half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
     return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
-
-
-def _once_round(turn_rates: Array, durations: Array) -> Array:
-    """How long coasts last (n,) [s] until they are where they began, or end."""
-    return np.minimum(durations, math.tau / np.maximum(np.abs(turn_rates), LEAST_TURN))
 
 
 def _object(skin: Skin) -> Any:

@@ -27,6 +27,8 @@ from maneuver_automaton.collision.geometry import (
 from maneuver_automaton.collision.motion import STANDS, Motion, planar
 from maneuver_automaton.groups import SE2, LieGroup
 
+PLAIN = 1e-6  # sine of the angle at a corner, beyond which rounding does not decide its side
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygon:
@@ -65,6 +67,21 @@ class Polygon:
         object.__setattr__(self, "corners", _ring("polygon: corners", self.corners))
         holes = tuple(_ring("polygon: a hole", hole) for hole in self.holes)
         object.__setattr__(self, "holes", holes)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether its ring surely surrounds its area once: of three or four corners, all one way.
+
+        Nothing is said of others: those have to be looked at by whoever wants to know.
+        """
+        if self.holes or len(self.corners) > 4:
+            return False
+        at = [complex(x, y) for x, y in self.corners.tolist()]
+        sides = [b - a for a, b in zip(at, at[1:] + at[:1], strict=True)]
+        turns = [a.conjugate() * b for a, b in zip(sides, sides[1:] + sides[:1], strict=True)]
+        least = [PLAIN * abs(turn) for turn in turns]
+        left = all(turn.imag > by for turn, by in zip(turns, least, strict=True))
+        return left or all(-turn.imag > by for turn, by in zip(turns, least, strict=True))
 
     def moved(self, by: LieGroup) -> Polygon:
         """The shape moved by a planar pose."""

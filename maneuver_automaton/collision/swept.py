@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -214,16 +215,23 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
     return excess
 
 
-def windows(turn_rates: Array, durations: Array) -> Windows:
-    """The fewest slices that cover coasts (n,) of `durations` [s], none longer than its coast."""
-    most = np.minimum(durations, MOST_TURN / np.maximum(np.abs(turn_rates), LEAST_TURN))
-    level = 1 - np.frexp(most)[1].astype(np.int64)
-    lengths = np.ldexp(1.0, -level)
-    count = np.ceil(durations / lengths).astype(np.int64)
-    coast = np.repeat(np.arange(count.size), count)
-    number = np.arange(coast.size) - (np.cumsum(count) - count)[coast]
-    begins = np.minimum(number * lengths[coast], (durations - lengths)[coast])
-    return Windows(coast, level[coast], begins)
+def windows(coasts: Iterable[tuple[Twist, float]]) -> Windows:
+    """The fewest slices that cover coasts, a twist and a duration [s] each, none longer than it.
+
+    Once around is enough.
+    """
+    coast, levels, begins = list[int](), list[int](), list[float]()
+    for k, ((_, _, turn), lasts) in enumerate(coasts):
+        rate = max(abs(turn), LEAST_TURN)
+        lasts = min(lasts, math.tau / rate)
+        level = 1 - math.frexp(min(lasts, MOST_TURN / rate))[1]
+        length = math.ldexp(1.0, -level)
+        count = math.ceil(lasts / length)
+        coast += [k] * count
+        levels += [level] * count
+        begins += [min(n * length, lasts - length) for n in range(count)]
+    numbers = np.array([coast, levels], dtype=np.int64)
+    return Windows(numbers[0], numbers[1], np.array(begins, dtype=np.float64))
 
 
 def halves(parts: Windows) -> Windows:

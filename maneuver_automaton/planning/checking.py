@@ -145,8 +145,8 @@ def check_plan(
 def what_passes_later(problem: Problem, plan: Plan) -> str:
     """What comes too near to a vehicle that stays where its plan ends; empty if nothing does."""
     arrival = plan.start_time + plan.duration
-    lasting = problem.quiet_after - arrival
-    if not problem.horizon.stay or not 0.0 < lasting < math.inf:
+    lasting = problem.quiet_after - arrival if problem.horizon.stay else 0.0
+    if not 0.0 < lasting < math.inf:
         return ""
     bodies = [("", plan.end, problem.footprint)]
     for name, shapes in problem.parts.items():

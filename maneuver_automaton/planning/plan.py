@@ -141,7 +141,7 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
-    budget = replace(budget, shows=shows)
+    budget = replace(budget, shows=shows) if shows else budget
     with patient():
         if gap is None:
             if watch is not None:
@@ -162,7 +162,8 @@ def plan_in(
 
 def _noted(result: PlanResult) -> PlanResult:
     """The result, with what was left out of planning."""
-    return replace(result, notes=(*result.notes, *left_out(result.problem)))
+    notes = left_out(result.problem)
+    return replace(result, notes=(*result.notes, *notes)) if notes else result
 
 
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:

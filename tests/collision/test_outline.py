@@ -8,7 +8,7 @@ import shapely
 
 from maneuver_automaton.audit.outlines import body_outline
 from maneuver_automaton.collision import Box, Polygon
-from maneuver_automaton.collision.outline import outlines, rings_of, united
+from maneuver_automaton.collision.outline import outlines, outlines_of, rings_of, united
 
 
 def area(corners, holes=()):
@@ -85,3 +85,20 @@ def test_a_piece_that_a_union_loses_is_found_again(monkeypatch):
     assert united([squares[0], squares[3]]).area == pytest.approx(3.0)
     rings = body_outline((knot,)).edges
     assert rings.holds(np.array([0.3 + 1.0j, 1.7 + 1.0j])).tolist() == [[True, True]]
+
+
+@pytest.mark.parametrize(
+    ("corners", "plain"),
+    [
+        ([[0, 0], [2, 0], [0, 1]], True),
+        ([[0, 0], [0, 1], [2, 1], [2, 0]], True),  # clockwise
+        ([[0, 0], [2, 0], [0, 1], [2, 1]], False),  # it crosses itself
+        ([[0, 0], [2, 0], [0.5, 0.5], [0, 2]], False),  # concave: nothing is said
+        ([[0, 0], [2, 0], [4, 0]], False),  # no area
+        ([[0, 0], [1, 0], [2, 1], [1, 2], [0, 1]], False),  # five corners: nothing is said
+    ],
+)
+def test_what_surely_surrounds_its_area_once(corners, plain):
+    polygon = Polygon(corners)
+    assert polygon.is_plain == plain
+    assert not plain or len(outlines_of([polygon])[0]) == 1

@@ -70,7 +70,7 @@ def _ring(hull):
 
 
 def _windows(twist, duration):
-    return windows(np.array([twist[2]]), np.array([duration]))
+    return windows([(twist, duration)])
 
 
 courses = st.lists(
