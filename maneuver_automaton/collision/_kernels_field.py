@@ -13,6 +13,8 @@ from maneuver_automaton.collision._kernels_clearance import point_to_segment
 from maneuver_automaton.collision.arrays import Buckets, Field, Place
 from maneuver_automaton.collision.convex import Solids
 
+LONGER = 1.0 + 1e-12  # than what rounding may take off a distance, squared
+
 
 @inner_kernel
 def distance_to_piece(x: float, y: float, corners: Array, first: int, last: int) -> float:
@@ -50,9 +52,10 @@ def write_pieces(field: Field, solids: Solids, n: int) -> None:
                 x = origin_x + (i + 0.5) * cell
                 d_x = max(max(plates[p, 0] - x, x - plates[p, 2]), 0.0)
                 # The box around the piece bounds its distance from below: where another piece is
-                # nearer than the box already, the corners are not looked at.
+                # nearer than the box already, the corners are not looked at. Where both are as near
+                # to the last digits they are: the least does not depend on the order of the pieces.
                 known = max(distance[j, i], 0.0)
-                if d_x * d_x + d_y * d_y > known * known:
+                if d_x * d_x + d_y * d_y > LONGER * known * known:
                     continue
                 # Rounded by its radius, a piece is nearer by as much.
                 value = distance_to_piece(x, y, edges, first[p], first[p + 1]) - plates[p, 4]
