@@ -30,13 +30,12 @@ def write_pieces(field: Field, solids: Solids, n: int) -> None:
     for p in range(n):
         low, high, rounding = plates[p, 0], plates[p, 2], plates[p, 4]
         i_0 = max(0, int((low - cap - field.origin_x) / cell))
-        i_1 = min(columns, int((high + cap - field.origin_x) / cell) + 1)
+        i_1 = max(i_0, min(columns, int((high + cap - field.origin_x) / cell) + 1))
         j_0 = max(0, int((plates[p, 1] - cap - field.origin_y) / cell))
         j_1 = min(rows, int((plates[p, 3] + cap - field.origin_y) / cell) + 1)
         x, square, left = xs[i_0:i_1], squares[i_0:i_1], lefts[i_0:i_1]
         for j in range(j_0, j_1):
             y = field.origin_y + (j + 0.5) * cell
-            d_y = max(max(plates[p, 1] - y, y - plates[p, 3]), 0.0)
             square[:] = math.inf
             # A line and a disc's middle have no inside.
             left[:] = math.inf if first[p + 1] - first[p] > 2 else -1.0
@@ -57,12 +56,7 @@ def write_pieces(field: Field, solids: Solids, n: int) -> None:
             for i in range(x.size):
                 # Rounded by its radius, a piece is nearer by as much.
                 apart = math.sqrt(square[i])
-                value = (-apart if left[i] >= 0.0 else apart) - rounding
-                # The box around the piece bounds its distance from below: where another piece is
-                # nearer than the box already, rounding decides nothing.
-                d_x, known = max(max(low - x[i], x[i] - high), 0.0), max(row[i], 0.0)
-                away = d_x * d_x + d_y * d_y
-                row[i] = row[i] if away > known * known else min(row[i], value)
+                row[i] = min(row[i], (-apart if left[i] >= 0.0 else apart) - rounding)
 
 
 @inner_kernel

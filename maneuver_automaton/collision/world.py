@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -154,7 +154,14 @@ def _static_arrays(
         if isinstance(one, OccupancyMap):
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
-    return solids, _buckets(solids.plates, body, keep), _field(solids, listed, maps, body, keep)
+    field = _field(solids, maps, body, keep)
+    _write(field, pieces[:listed], [] if maps else _last_field(footprint, frame, keep))
+    for one in maps:
+        x, y, heading = one.origin.tolist()
+        there = Place(x, y, math.cos(heading), math.sin(heading))
+        cells = np.broadcast_to(one.blocked, one.blocked.shape)  # read-only, wherever it is from
+        _kernels_field.write_map(field, cells, one.resolution, there)
+    return solids, _buckets(solids.plates, body, keep), field
 
 
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
@@ -216,8 +223,30 @@ def _box(boxes: Array, moving: list[_Moving], frame: Array) -> Array:
     return np.concatenate([low.min(axis=0), high.max(axis=0)])
 
 
-def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
-    """Distances: polygons one by one, maps by a transform of their cells."""
+_Last: TypeAlias = list[tuple[Field, frozenset[tuple[bytes, float]]]]
+
+
+@functools.lru_cache(maxsize=16)
+def _last_field(footprint: tuple[Shape, ...], frame: tuple[float, ...], keep: float) -> _Last:
+    """Where the last field that was begun anew is kept, with its pieces."""
+    return []
+
+
+def _write(field: Field, pieces: list[tuple[Array, float]], last: _Last) -> None:
+    """Lower a field to the distances of pieces: on from the last one, if these hold all of its."""
+    keys = [(ring.tobytes(), by) for ring, by in pieces]
+    begun, known = last[0] if last else (field, frozenset())
+    alike = begun[1:] == field[1:] and begun.distance.shape == field.distance.shape
+    if known and alike and known.issubset(keys):
+        field.distance[:] = begun.distance
+        pieces = [one for one, key in zip(pieces, keys, strict=True) if key not in known]
+    else:
+        last[:] = [(field, frozenset(keys))]
+    _kernels_field.write_pieces(field, solids_of(pieces), len(pieces))
+
+
+def _field(solids: Solids, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
+    """A field for all solids, not yet written: polygons one by one, maps by their cells."""
     if not len(solids.plates):
         return Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf)
     low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
@@ -234,14 +263,7 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     left, below = (low - cap).tolist()
-    field = Field(np.full((rows, columns), cap), left, below, cell, cap)
-    _kernels_field.write_pieces(field, solids, listed)
-    for one in maps:
-        x, y, heading = one.origin.tolist()
-        place = Place(x, y, math.cos(heading), math.sin(heading))
-        cells = np.broadcast_to(one.blocked, one.blocked.shape)  # read-only, wherever it is from
-        _kernels_field.write_map(field, cells, one.resolution, place)
-    return field
+    return Field(np.full((rows, columns), cap), left, below, cell, cap)
 
 
 def _buckets(plates: Array, body: Body, keep: float) -> Buckets:

@@ -27,13 +27,7 @@ from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import (
-    FleetMember,
-    OwnPlan,
-    courses_of,
-    prepare_vehicles,
-    vehicles_of,
-)
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, courses_of, vehicles_of
 from maneuver_automaton.fleet.verdict import STANDS, verified
 from maneuver_automaton.fleet.workers import How, PoolTask, WorkerPool
 
@@ -160,7 +154,6 @@ class _FleetSearch:
 
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
-        prepare_vehicles(self.vehicles)
         tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
         for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
             pass

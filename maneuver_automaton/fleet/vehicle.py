@@ -191,7 +191,6 @@ class FleetMember:
     grown: float  # [m] by which others see it larger
     workspace: Workspace
     alone: OwnPlan | None = None  # its plan by itself
-    bound: LowerBound | None = None  # no plan of it costs less
     why_none: str = ""  # why it has no plan by itself
     # Alone, the cheapest first; none where its plans are no words of the lattice in a plane.
     ways: list[Word] = field(default_factory=list)
@@ -236,20 +235,26 @@ class FleetMember:
             if one.height is None or (one.height[0] <= high + keep and one.height[1] >= low - keep)
         ]
 
-    def plan_alone(self, budget: Budget, *, bounded: bool = True, hurried: bool = False) -> None:
+    @functools.cached_property
+    def bound(self) -> LowerBound | None:
+        """No plan of it costs less; None for one that has none. No search asks for it."""
+        if not self.ways or self.aimed is not self.problem:
+            return formula_bound(self.problem) if self.ways else None
+        return lattice_bound(self._query(self.aimed))
+
+    def plan_alone(self, budget: Budget, *, hurried: bool = False) -> None:
         """Find its way, and a few others beside it, past static obstacles; `hurried`: as found."""
         blocked, searched = blocked_ends(self.aimed), replace(self.problem.search, method="lattice")
         steers = uses_lattice(replace(self.problem, search=searched))
         if blocked is not None:
             self.why_none = blocked.reason
         elif steers and not self.problem.has_inertia and self.problem.start.size == 3:
-            self._plan_words(budget, bounded=bounded, hurried=hurried)
+            self._plan_words(budget, hurried=hurried)
         else:
             result = self._planned(self.problem, budget, improve=False)
-            self.alone, self.why_none = self._found(result), result.reason
-            self.bound = result.bound
+            self.alone, self.why_none, self.bound = self._found(result), result.reason, result.bound
 
-    def _plan_words(self, budget: Budget, *, bounded: bool, hurried: bool) -> None:
+    def _plan_words(self, budget: Budget, *, hurried: bool) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.aimed)
         first = self._first(query, budget, LONGEST)
@@ -266,9 +271,6 @@ class FleetMember:
             self._keep(query, [word])
         else:
             self._keep_ways(query, word, budget, AT_ONCE)
-        if bounded:
-            aims_exactly = self.aimed is self.problem
-            self.bound = lattice_bound(query) if aims_exactly else formula_bound(self.problem)
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past past obstacles, and others beside them."""

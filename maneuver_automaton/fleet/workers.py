@@ -147,7 +147,7 @@ def answered(
     there = FleetMember(
         vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
-    there.plan_alone(budget, bounded=False)
+    there.plan_alone(budget)
     spent = 0.0 if head is None else vehicle.problem.cost_of(head)
     if there.alone is None or not there.alone.cost + spent < terms.known:
         return Proposal(None, None)

@@ -12,7 +12,7 @@ import math
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
-from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision._kernels_advancement import free_of_static, free_time
 from maneuver_automaton.collision._kernels_clearance import surely_hits
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
@@ -321,6 +321,22 @@ def coast_free(
 ) -> bool:
     """Whether coasting a trim from a pose for `t` is proven free; the world's time is `clock`."""
     free, _ = coast_proven(scene, lib, trim, pose, t, clock)
+    return free >= t
+
+
+@bare_inner_kernel
+def clear_of_static(
+    scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
+) -> bool:
+    """Whether coasting is proven free of all that never moves; asked of one body in one plane.
+
+    What it calls blocked `coast_free` does at any time.
+    """
+    if not is_one_in_plane(scene, lib):
+        return True
+    twist, fastest = lib.library.twists[trim], lib.parts.fastest[trim]
+    motion = Coast(pose[0], pose[1], pose[2], twist[0], twist[1], twist[2], fastest, t, 0.0)
+    free, _ = free_of_static(scene.layers.first, lib.parts.body, motion, scene.keep, scene.margin)
     return free >= t
 
 

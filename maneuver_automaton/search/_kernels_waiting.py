@@ -10,7 +10,12 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.search._kernels_coast import coast_free, coast_proven, may_stay
+from maneuver_automaton.search._kernels_coast import (
+    clear_of_static,
+    coast_free,
+    coast_proven,
+    may_stay,
+)
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search.arrays import PathArrays, PathSearch
 
@@ -35,6 +40,11 @@ def earliest_arrival(search: PathSearch) -> int:
     clock, tick, quiet = limits.clock, search.tick, search.quiet
     n, asked = path.trims.shape[0], 0
     path.state[USED] = path.state[QUEUED] = 0
+    if search.rest >= 0:  # what never moves is in the way at all times: none need be tried
+        for joint in range(n):
+            trim, t = path.trims[joint], path.durations[joint]
+            if not clear_of_static(scene, lib, trim, _pose(path, joint), t):
+                return -1
     _reach(search, 0, 0.0, -1, 0.0)
     while path.state[QUEUED] > 0:
         state = pop(path.keys, path.items, path.state[QUEUED])
