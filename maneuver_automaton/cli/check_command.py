@@ -190,11 +190,11 @@ def _trims(automaton: Automaton) -> Finding:
     expected = (model.group(start) @ coasted).pose
     reduced = states[:, model.group.dof :]
     defect = np.abs(driven - np.concatenate([expected, reduced], axis=1)).max(axis=1)
-    worst = int(defect.argmax())
+    worst = int(defect.round(12).argmax())  # of equal ones the first: rounding is the machine's
     return Finding(
         what="automaton: trims follow the model",
-        holds=bool(defect[worst] <= TRIM_TOLERANCE),
-        worst=float(defect[worst]),
+        holds=bool(defect.max() <= TRIM_TOLERANCE),
+        worst=float(defect.max()),
         words=f"{len(trims)} trims driven for {TRIM_SECONDS:g} s by an ODE solver, "
         f"worst {trims[worst].name!r}",
     )
