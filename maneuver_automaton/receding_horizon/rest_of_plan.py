@@ -113,11 +113,11 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
 
     Source: the paper, Sec. 4.2 (rest to the end) and 5.1 (greatest cost first).
     """
-    if len(plan.trims) < 2:
-        return plan
     twists = [trim.body_velocity.tolist() for trim in plan.trims]
-    moves = [any(twist) for twist in twists]
-    moving = [k for k, move in enumerate(moves) if move]
+    moving = [k for k, twist in enumerate(twists) if any(twist)]
+    rests_last = moving == list(range(len(moving)))
+    if rests_last and not any(map(commute, twists, twists[1 : len(moving)])):
+        return plan  # no neighbours commute
     order: list[int] = []
     block: list[int] = []
     costly: list[float] = (-rates).tolist()
@@ -127,7 +127,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
             block = []
         block.append(k)
     order += sorted(block, key=costly.__getitem__)
-    order += [k for k, move in enumerate(moves) if not move]
+    order += [k for k, twist in enumerate(twists) if not any(twist)]
     if order == list(range(len(twists))):
         return plan
     word, times = merged([plan.trims[k] for k in order], plan.durations[order].tolist())

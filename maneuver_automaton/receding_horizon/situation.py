@@ -197,7 +197,7 @@ class Situation:
     def may_rest(self) -> bool:
         """Whether the vehicle may end its drive here: it switches at will, or its plan is over."""
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return self.is_over or (switches_at_will(self.here) and not fixed)
+        return (switches_at_will(self.here) and not fixed) or self.is_over
 
     def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""

@@ -227,9 +227,9 @@ class StepSearch:
             held = None if index is None else holding(here, now.settings, index)
             if held is not None and self.is_safe(held.plan):
                 return replace(held, shifted_value=held.cost, arrived=True)
-        if index is None and now.last is not None and now.is_over:
+        if index is None and now.last is not None:
             before = now.last.goal_index
-            index = before if within(here.start, here.goals[before]) else None
+            index = before if within(here.start, here.goals[before]) and now.is_over else None
         if index is None:
             return None
         there = now.resting(index)

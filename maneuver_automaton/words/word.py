@@ -43,7 +43,7 @@ class Word:
         _freeze_numbers(self, "trims", self.trims)
         held = self.transitions
         n = max(0, self.trims.size - 1)
-        _freeze_numbers(self, "transitions", np.full(n, SWITCH) if held is None else held)
+        _freeze_numbers(self, "transitions", [SWITCH] * n if held is None else held)
 
     @property
     def duration(self) -> float:
