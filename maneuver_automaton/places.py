@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
@@ -335,6 +335,7 @@ class Ground:
         """
         values = as_array("elevation: heights", heights)
         if max_cross_slope is not None:
+            max_cross_slope = as_number("elevation: max_cross_slope", max_cross_slope)
             _check_number("elevation: max_cross_slope", max_cross_slope)
         hills = Raster(
             values,
