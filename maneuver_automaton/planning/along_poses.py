@@ -572,7 +572,7 @@ class _Search:
             self._offer(begun)
 
     def bound(self) -> LowerBound:
-        """No plan is cheaper: the sum of the bounds of legs, in the best order, or the way past none.
+        """No plan is cheaper: the sum of the bounds of legs, in the best order, or the direct way.
 
         That way may cost more: a gate counts as the disc around it.
         """
