@@ -335,7 +335,6 @@ class Ground:
         """
         values = as_array("elevation: heights", heights)
         if max_cross_slope is not None:
-            max_cross_slope = as_number("elevation: max_cross_slope", max_cross_slope)
             _check_number("elevation: max_cross_slope", max_cross_slope)
         hills = Raster(
             values,
@@ -640,7 +639,7 @@ def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def _check_number(what: str, value: float) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
+    if not (math.isfinite(as_number(what, value)) and value >= 0.0):
         raise ValueError(f"{what} must be a number of at least 0, got {value}")
 
 

@@ -572,14 +572,11 @@ class _Search:
             self._offer(begun)
 
     def bound(self) -> LowerBound:
-        """No plan is cheaper: the sum of the bounds of legs, in the best order, or the direct way.
-
-        That way may cost more: a gate counts as the disc around it.
-        """
+        """No plan is cheaper: the sum of the bounds of legs, in the best order, or of none."""
         ways = np.arange(len(self.ways))
         remains = _remaining(self.bounds, ways, self._stays, in_order=self.in_order)
-        least = max(float(remains[0][-1]), self.direct + float(self._stays.sum()))
-        return LowerBound(value=max(0.0, least), kind="distance")
+        direct = self.direct + float(self._stays.sum())  # may be more: a gate counts as a disc
+        return LowerBound(value=max(0.0, direct, float(remains[0][-1])), kind="distance")
 
     def why_none(self) -> tuple[PlanStatus, str]:
         """How it ended without a plan, and why."""
