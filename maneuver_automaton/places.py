@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
@@ -639,7 +639,7 @@ def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def _check_number(what: str, value: float) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
+    if not (math.isfinite(as_number(what, value)) and value >= 0.0):
         raise ValueError(f"{what} must be a number of at least 0, got {value}")
 
 

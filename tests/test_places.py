@@ -217,6 +217,10 @@ def test_plans_say_what_they_cost_and_where():
             lambda: Ground.of_costmap([[256]], resolution=1.0),
             "reach from 256 to 256, need 0 to 255",
         ),
+        (
+            lambda: Ground.of_elevation([[1.0]], resolution=1.0, max_cross_slope="0.3"),
+            "elevation: max_cross_slope: got '0.3', need a number",
+        ),
         (lambda: problem("near"), "place_costs[0]: got 'near', need Clearance, Ground, or"),
     ],
 )

@@ -91,7 +91,7 @@ class FieldProblem:
             raise ValueError(f"field: {why[:1].lower()}{why[1:]}, need a simple polygon")
         for name, least in (("width", 1e-3), ("headland", 0.0)):
             if not least <= (value := getattr(self, name)) < math.inf:
-                raise ValueError(f"field: {name} must be a positive number, got {value}")
+                raise ValueError(f"field: {name} must be at least {least:g} m, got {value}")
         planner, automaton = self.planner, self.planner.automaton
         if not all(isinstance(one, Obstacle) and one.motion is None for one in planner.obstacles):
             raise ValueError("field: an obstacle moves or is a map, need shapes that stand")
@@ -269,6 +269,7 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
     near = np.argsort(np.round(costs, 6), axis=1, kind="stable")[:, :NEAREST]
     wanted = [(s, t) for s, row in enumerate(near.tolist()) for t in row if costs[s, t] < np.inf]
     known: dict[tuple[int, int], Plan | None] = {}
+    order, bound, pairs = [0], 0.0, list[tuple[int, int]]()  # one swath takes no turn
     while wanted:
         goals = [Goal(both[t, 0], trim=planner.start_trim) for _, t in wanted]
         starts = both[[s for s, _ in wanted], 1]
@@ -285,7 +286,7 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
         swaths=both[order],
         turns=tuple(turn for turn in driven if turn is not None),
         result=_as_one(problem, planner, both[order], driven),
-        turns_cost=sum(float(costs[pair]) for pair in pairs),
+        turns_cost=sum((float(costs[pair]) for pair in pairs), 0.0),
         order_bound=bound if planner.automaton.is_kinematic else None,
     )
 
@@ -307,7 +308,7 @@ def _swaths_along(problem: FieldProblem, angle: float) -> Array:
     for y in np.linspace(low + inset, high - inset, count).tolist():
         strip = shapely.box(left - 1.0, y - 0.5 * width, right + 1.0, y + 0.5 * width)
         parts = shapely.get_parts(strip.intersection(inner))
-        x = shapely.bounds(parts[shapely.area(parts) > 1e-4 * width * width])[:, ::2]
+        x = shapely.bounds(parts[shapely.area(parts) > 4e-4 * inset * inset])[:, ::2]
         united_x = shapely.union_all(shapely.box(x[:, 0], 0.0, x[:, 1], 1.0))
         spans = shapely.bounds(shapely.get_parts(united_x))[:, ::2]
         rows += [[[x, y, 0.0] for x in span] for span in sorted(spans.tolist())]

@@ -77,8 +77,8 @@ def load_field(
         raise document.error((), "is no mapping, need a scenario with the key 'field'")
     rest, part = dict(document.value), FieldPart()
     if "field" in rest:
-        if ends := {"start", "goal"} & set(rest):
-            raise document.error((min(ends),), "is for plan; a field has none, leave it out")
+        if others := {"start", "goal", "via", "order"} & set(rest):
+            raise document.error((min(others),), "is for plan; a field has none, leave it out")
         own = replace(document, value=rest.pop("field"), homes={(): at})
         part = parts.checked(own, FieldPart)
     found = part.model_dump(exclude_none=True)

@@ -232,6 +232,7 @@ class _Search:
     arrivals: list[tuple[int, Arrival]] = field(init=False)  # all of them, with their way
     costs: Array = field(init=False)  # (A + 1, A + 1) of legs: estimates until they are planned
     bounds: Array = field(init=False)  # (n + 1, n + 1) the same between ways: nothing is cheaper
+    direct: float = field(init=False)  # from the start to the goal nothing is cheaper either
     estimated: LegCosts = field(init=False)
 
     def __post_init__(self) -> None:
@@ -243,6 +244,7 @@ class _Search:
         # a maneuver from a state of no trim is no word of the library
         between = self.legs.between
         bounded = replace(between, horizon=middle.horizon) if between.has_states else middle
+        self.direct = min(set_bound(bounded, None, goal) for goal in goals)
         for i, k in self._pairs():
             ends = goals if k == n else (goal_around(self.ways[k].via),)
             begin = None if i == n else goal_around(self.ways[i].via)
@@ -570,10 +572,11 @@ class _Search:
             self._offer(begun)
 
     def bound(self) -> LowerBound:
-        """No plan is cheaper: the sum of the bounds of legs, in the best order."""
+        """No plan is cheaper: the sum of the bounds of legs, in the best order, or of none."""
         ways = np.arange(len(self.ways))
         remains = _remaining(self.bounds, ways, self._stays, in_order=self.in_order)
-        return LowerBound(value=max(0.0, float(remains[0][-1])), kind="distance")
+        direct = self.direct + float(self._stays.sum())  # may be more: a gate counts as a disc
+        return LowerBound(value=max(0.0, direct, float(remains[0][-1])), kind="distance")
 
     def why_none(self) -> tuple[PlanStatus, str]:
         """How it ended without a plan, and why."""

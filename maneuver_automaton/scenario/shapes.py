@@ -287,8 +287,7 @@ def _values(path: Path, *, shades: float) -> Array:
     if path.suffix != ".npy":
         return np.asarray(read_grey_image(path).shade[::-1] * shades)
     try:
-        values = np.load(path, allow_pickle=False)
-        return np.asarray(values, dtype=np.float64)
+        return np.asarray(np.load(path, allow_pickle=False))  # whose numbers the ground checks
     except (OSError, ValueError, TypeError, EOFError) as error:
         raise InvalidScenario(f"{path}: cannot be read as an array of NumPy: {error}") from error
 

@@ -126,14 +126,23 @@ def test_with_inertia_swaths_are_driven_at_speed():
     assert {trim.reduced_state[0] for trim in done.result.plan.trims} <= {0.0, 1.0}
 
 
+@pytest.mark.parametrize("width", [3.0, 1e4])
+def test_one_swath_takes_no_turn(width):
+    strip = [[0, 0], [60, 0], [60, 27], [0, 27]]  # 3 m of it inside the headland
+    done = ma.cover(ma.FieldProblem(tractor(), strip, width=width, headland=12.0))
+    assert (len(done.swaths), done.turns, done.turns_cost, done.order_bound) == (1, (), 0.0, 0.0)
+    assert done.covered == pytest.approx(1.0)
+    assert done.result.audit.passed
+
+
 @pytest.mark.parametrize(
     ("field", "how", "said"),
     [
         ([[0, 0], [20, 20], [20, 0], [0, 20]], {"width": 3.0},
          "field: self-intersection[10 10], need a simple polygon"),
-        (OBLONG, {"width": 0.0}, "field: width must be a positive number, got 0.0"),
+        (OBLONG, {"width": 0.0}, "field: width must be at least 0.001 m, got 0.0"),
         (OBLONG, {"width": 3.0, "headland": -1.0},
-         "field: headland must be a positive number, got -1.0"),
+         "field: headland must be at least 0 m, got -1.0"),
     ],
 )  # fmt: skip
 def test_bad_input_is_told(field, how, said):

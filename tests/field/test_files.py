@@ -96,6 +96,7 @@ def test_the_meadow_reads():
          "field: nothing is left of it inside a headland of 20 m: the largest circle in it has a "
          "radius of 17 m"),
         (FIELD + "start: {pose: [0, 0, 0]}\n", "start: is for plan; a field has none"),
+        (FIELD + "via: [{pose: [9, 9, 0]}]\n", "via: is for plan; a field has none"),
         (FIELD.replace("headland_m", "headlands_m"), "headlands_m"),
     ],
 )  # fmt: skip

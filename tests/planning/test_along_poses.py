@@ -159,6 +159,14 @@ def test_an_order_that_is_free_is_the_best_of_all():
     assert result.lower_bound == result.cost  # words of three trims are enough
 
 
+def test_past_a_wide_gate_the_bound_is_no_lower_than_without_it():
+    """The disc around the gate holds the start."""
+    via = [ma.Via(gate=[[5, -9], [5, 9]]), ma.Via([7, 0], free_heading=True, stay_s=1.5)]
+    for order in ("given", "free"):
+        result = planned(ma.Problem(ROBOT, START, [9, 0, 0], via=via, order=order))
+        assert result.lower_bound == pytest.approx(10.5) == result.cost
+
+
 def test_a_gate_is_crossed_and_a_stop_lasts():
     via = [ma.Via(gate=[[3, -1], [3, 2]]), ma.Via([6, 0, 0], stay_s=2.0)]
     result = planned(ma.Problem(ROBOT, START, [9, 0, 0], via=via))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from maneuver_automaton.cli import run
@@ -828,6 +829,17 @@ def test_a_file_that_is_not_closed_names_its_line():
 def test_missing_file(capsys):
     assert run(["plan", "nowhere.yaml"]) == 2
     assert capsys.readouterr().err == "nowhere.yaml: no such file\n"
+
+
+@pytest.mark.parametrize("kind", ["raster", "costmap", "elevation"])
+@pytest.mark.parametrize("values", [[[1.0 + 2.0j]], [["a", "b"]], [[np.nan]]])
+def test_a_raster_needs_finite_numbers(values, kind, tmp_path):
+    np.save(tmp_path / "cells.npy", values)
+    path = tmp_path / "case.yaml"
+    ground = f"cost: {{effort: 1.0, ground: [{{{kind}: cells.npy, resolution_m: 0.5}}]}}"
+    path.write_text(but("cost: {effort: 1.0}", ground))
+    with pytest.raises(InvalidScenario, match=rf"\[0\]\.{kind}: .*, need (finite )?numbers$"):
+        load_scenario(path)
 
 
 def test_a_folder_is_no_file(tmp_path):
