@@ -42,12 +42,7 @@ def from_segment(
 
 @bare_inner_kernel
 def separation(
-    body: Body | SweptAreas,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    enough: float,
+    body: Body | SweptAreas, b: int, place: Place, solids: Solids, p: int, enough: float
 ) -> tuple[float, float, float]:
     """Largest separation of two convex cores over the normals of their edges, and that normal.
 
@@ -94,12 +89,7 @@ def separation(
 
 @bare_inner_kernel
 def core_distance(
-    body: Body,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    axis: tuple[float, float],
+    body: Body, b: int, place: Place, solids: Solids, p: int, axis: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Distance of two convex cores that do not overlap, and its direction towards the body.
 
@@ -168,13 +158,7 @@ def core_distance(
 
 @bare_inner_kernel
 def piece_clearance(
-    body: Body,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    near: float,
-    enough: float,
+    body: Body, b: int, place: Place, solids: Solids, p: int, near: float, enough: float
 ) -> tuple[float, float, float]:
     """Clearance of one piece of the body to one solid, and its direction.
 

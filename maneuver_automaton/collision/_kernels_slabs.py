@@ -151,11 +151,7 @@ def swept_box(body: Body, motion: Coast) -> tuple[float, float, float, float]:
 
 @bare_inner_kernel
 def apart_during(
-    slabs: Slabs,
-    n: int,
-    m: int,
-    during: tuple[int, int],
-    swept: tuple[float, float, float, float],
+    slabs: Slabs, n: int, m: int, during: tuple[int, int], swept: tuple[float, float, float, float]
 ) -> float:
     """How far obstacle `m` of `n` stays from a body's middle in two slabs, at least; else below 0.
 

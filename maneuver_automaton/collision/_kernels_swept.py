@@ -137,12 +137,7 @@ def sweep(
 
 @bare_inner_kernel
 def not_parted(
-    world: WorldArrays,
-    body: Body,
-    swept: SweptAreas,
-    motion: int,
-    place: Place,
-    enough: float,
+    world: WorldArrays, body: Body, swept: SweptAreas, motion: int, place: Place, enough: float
 ) -> int:
     """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
 

@@ -117,9 +117,7 @@ def set_task(call: FirstCallArrays, task: Task, margin: float) -> Task:
         task.estimates,
         task.connecting,
         Truncation(
-            task.truncation.kept,
-            max(call.margins.back_off, 2.0 * margin),
-            task.truncation.shortest,
+            task.truncation.kept, max(call.margins.back_off, 2.0 * margin), task.truncation.shortest
         ),
         task.limits,
         task.stop_at_first,

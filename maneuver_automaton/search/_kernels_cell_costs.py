@@ -35,14 +35,7 @@ Ways = tuple[complex, complex, complex]
 # and arm where that turns; the price of the free trim and of the triple; phases and lengths of
 # at_1 and at_2.
 ClosedForm = tuple[
-    tuple[int, float],
-    tuple[complex, float],
-    Three,
-    Ways,
-    tuple[complex, complex],
-    Ways,
-    Four,
-    Four,
+    tuple[int, float], tuple[complex, float], Three, Ways, tuple[complex, complex], Ways, Four, Four
 ]
 
 COARSE = 2  # stretches of all cells of a word, which are looked at first

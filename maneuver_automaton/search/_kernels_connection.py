@@ -139,12 +139,7 @@ def transition_free(
 
 @bare_shared_kernel
 def connection_free(
-    scene: Scene,
-    lib: LatticeArrays,
-    joint: Joint,
-    word: IntArray,
-    climb: int,
-    times: Array,
+    scene: Scene, lib: LatticeArrays, joint: Joint, word: IntArray, climb: int, times: Array
 ) -> bool:
     """Whether a connection is free all the way: three trims, a climb, and the trim of its goal.
 
@@ -225,12 +220,7 @@ def connection_place(
 
 @bare_inner_kernel
 def free_candidate(
-    scene: Scene,
-    lib: LatticeArrays,
-    words: IntArray,
-    joint: Joint,
-    n: int,
-    scratch: Scratch,
+    scene: Scene, lib: LatticeArrays, words: IntArray, joint: Joint, n: int, scratch: Scratch
 ) -> int:
     """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
 

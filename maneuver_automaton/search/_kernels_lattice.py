@@ -29,11 +29,7 @@ from maneuver_automaton.search._kernels_coast import (
     swept_end,
     too_short,
 )
-from maneuver_automaton.search._kernels_connection import (
-    edge_inside,
-    edge_proven,
-    free_candidate,
-)
+from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven, free_candidate
 from maneuver_automaton.search._kernels_distance import push
 from maneuver_automaton.search._kernels_estimate import cost_to_go
 from maneuver_automaton.search._kernels_nodes import (
@@ -74,13 +70,7 @@ from maneuver_automaton.search._kernels_nodes import (
     slot_of,
 )
 from maneuver_automaton.search._kernels_place import coast_place, edge_place, places_cost
-from maneuver_automaton.search.arrays import (
-    Joint,
-    LatticeArrays,
-    LatticeSearch,
-    SearchArrays,
-    Task,
-)
+from maneuver_automaton.search.arrays import Joint, LatticeArrays, LatticeSearch, SearchArrays, Task
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import class_of, price_of_switch
 
@@ -134,9 +124,7 @@ def expanded(search: LatticeSearch, n: int, upper_bound: float) -> int:
 
 
 @bare_inner_kernel
-def _push_roots(
-    search: LatticeSearch,
-) -> None:
+def _push_roots(search: LatticeSearch) -> None:
     """Push the roots of a search."""
     task, lib = search.task, search.library
     arrays, roots = search.arrays, search.task.roots

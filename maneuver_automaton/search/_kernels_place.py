@@ -16,12 +16,7 @@ from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.collision.arrays import Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_coast import (
-    coasted,
-    edge_end,
-    is_one_in_plane,
-    part_body,
-)
+from maneuver_automaton.search._kernels_coast import coasted, edge_end, is_one_in_plane, part_body
 from maneuver_automaton.search.arrays import LatticeArrays, PlaceArrays, Scene
 
 GAUSS = 0.5 / math.sqrt(3.0)  # of a step: both points of the rule from its middle

@@ -327,11 +327,7 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
 
 @bare_inner_kernel
 def push_others(
-    search: GraphArrays,
-    lattice: StateLattice,
-    item: int,
-    node: tuple[int, int, int],
-    ahead: float,
+    search: GraphArrays, lattice: StateLattice, item: int, node: tuple[int, int, int], ahead: float
 ) -> None:
     """List all motions from nodes that were expanded to `node`, but for one of them.
 

@@ -96,12 +96,7 @@ def solve_triple(
             stage += 1
         else:
             t = word[i]
-            pose = moved(
-                pose,
-                complex(twists[t, 0], twists[t, 1]),
-                twists[t, 2],
-                times[i],
-            )
+            pose = moved(pose, complex(twists[t, 0], twists[t, 1]), twists[t, 2], times[i])
     # goal seen from the end of the lead, before the tail
     z = complex(goal[0], goal[1])
     heading = goal[2] - pose[1]

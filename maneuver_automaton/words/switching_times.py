@@ -148,9 +148,7 @@ def solve_switching_times(
 
 
 def _within(
-    floors: Array,
-    limits: Array,
-    solved_from: Callable[[Array, NDArray[np.bool_]], SwitchingTimes],
+    floors: Array, limits: Array, solved_from: Callable[[Array, NDArray[np.bool_]], SwitchingTimes]
 ) -> SwitchingTimes:
     """Best times of at least `floors` (n,), those fixed one by one that exceed `limits` (n,)."""
     if (floors > limits).any():
@@ -303,8 +301,5 @@ def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:
 
 def _failed(n: int) -> SwitchingTimes:
     return SwitchingTimes(
-        status=TimesStatus.FAILED,
-        durations=np.zeros(n),
-        cost=math.inf,
-        multipliers=np.zeros(3),
+        status=TimesStatus.FAILED, durations=np.zeros(n), cost=math.inf, multipliers=np.zeros(3)
     )
