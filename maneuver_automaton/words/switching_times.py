@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,23 +139,12 @@ def solve_switching_times(
     steps = _steps(displacements, n, end.size)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
-
-    def solved_from(floors: Array, free: NDArray[np.bool_]) -> SwitchingTimes:
-        word = _ConjugatedWord(rows, steps, floors, end, free_heading)
-        return word.solved(prices, free, given, starts, restarts)
-
-    return _within(floors, limits, solved_from)
-
-
-def _within(
-    floors: Array, limits: Array, solved_from: Callable[[Array, NDArray[np.bool_]], SwitchingTimes]
-) -> SwitchingTimes:
-    """Best times of at least `floors` (n,), those fixed one by one that exceed `limits` (n,)."""
     if (floors > limits).any():
-        return _failed(floors.size)
-    free = np.ones(floors.size, dtype=np.bool_)
-    while True:
-        solved = solved_from(floors, free)
+        return _failed(n)
+    free = np.ones(n, dtype=np.bool_)
+    while True:  # those that exceed their limits are fixed, one by one
+        word = _ConjugatedWord(rows, steps, floors, end, free_heading)
+        solved = word.solved(prices, free, given, starts, restarts)
         late = free & (solved.durations > limits)
         if solved.status is TimesStatus.FAILED or not late.any():
             return solved
