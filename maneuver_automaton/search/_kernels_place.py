@@ -33,10 +33,8 @@ def places_cost(scene: Scene) -> bool:
 def distance_within(
     world: WorldArrays, body: Body, x: float, y: float, heading: float, within: float
 ) -> float:
-    """Distance [m] of a body to what stands around it, exact below `within`, and no more than it.
-
-    The world has to know all that is nearer than `within`, as one does that keeps that distance.
-    """
+    """Distance [m] of a body to what stands around it, exact below `within`, at most that."""
+    # The world has to know all that is nearer than `within`, as one does that keeps that distance.
     place = Place(x, y, math.cos(heading), math.sin(heading))
     if field_bound(world.field, body, place) >= within:
         return within

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.words import _kernels_solve as kernels
+from maneuver_automaton.words._kernels_closing import MET
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.closing import MET, conjugated, conjugated_turn, goal_before
+from maneuver_automaton.words.closing import conjugated, conjugated_turn, goal_before
 
 RESTARTS = 12  # further starts where the first one fails
 TURNS = (0.5, 2.0 * math.pi - 0.5)  # [rad] of a free heading that iterations start with
