@@ -26,11 +26,8 @@ FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 def free_time(
     world: WorldArrays, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float]:
-    """How long a motion is proven free, at most its duration; and the last clearance.
-
-    The clearance is more than `keep + margin` wherever it is looked at, and more than `keep` in
-    between.
-    """
+    """How long a motion is proven free, at most its duration; and the last clearance."""
+    # The clearance is more than `keep + margin` wherever it is looked at, more than `keep` between.
     free, clearance = free_of_static(world, body, motion, keep, margin)
     # Where it begins too near to a solid, there is nothing left to prove.
     if world.moving.speed.shape[0] > 0 and (free > 0.0 or clearance > margin):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision.arrays import (
     AboutCenter,
@@ -28,12 +29,10 @@ ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passe
 
 
 @bare_inner_kernel
-def from_segment(
-    x: float, y: float, ax: float, ay: float, bx: float, by: float
-) -> tuple[float, float]:
-    """Vector to a point from the nearest point of a segment."""
-    dx, dy = bx - ax, by - ay
-    px, py = x - ax, y - ay
+def from_segment(x: float, y: float, edges: Array, a: int, b: int) -> tuple[float, float]:
+    """Vector to a point from the nearest point of the segment between two rows of `edges`."""
+    dx, dy = edges[b, 0] - edges[a, 0], edges[b, 1] - edges[a, 1]
+    px, py = x - edges[a, 0], y - edges[a, 1]
     square = dx * dx + dy * dy
     t = (px * dx + py * dy) / square if square > 0.0 else 0.0
     t = min(max(t, 0.0), 1.0)
@@ -42,18 +41,10 @@ def from_segment(
 
 @bare_inner_kernel
 def separation(
-    body: Body | SweptAreas,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    enough: float,
+    body: Body | SweptAreas, b: int, place: Place, solids: Solids, p: int, enough: float
 ) -> tuple[float, float, float]:
-    """Largest separation of two convex cores over the normals of their edges, and that normal.
-
-    A lower bound of their distance, not positive only if they touch; -inf without edges. The normal
-    points to the body. Stops at `enough`.
-    """
+    """Largest separation of two convex cores over the normals of their edges, and that normal."""
+    # It points to the body; -inf without edges; no search goes on above `enough`.
     # The theorem of the separating axis: two convex polygons with an area are apart exactly if the
     # normal of an edge of one of them parts them. Every such separation is a lower bound of the
     # distance, so the largest is, and a positive one proves that they are apart.
@@ -94,17 +85,10 @@ def separation(
 
 @bare_inner_kernel
 def core_distance(
-    body: Body,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    axis: tuple[float, float],
+    body: Body, b: int, place: Place, solids: Solids, p: int, axis: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Distance of two convex cores that do not overlap, and its direction towards the body.
-
-    The direction `axis`, towards the body, parts the two, or is none, (0, 0).
-    """
+    """Distance of two convex cores that do not overlap, and its direction towards the body."""
+    # The direction `axis`, towards the body, parts the two, or is none, (0, 0).
     x, y, c, s = place
     n_x, n_y = axis
     b_0, b_1 = body.first[b], body.first[b + 1]
@@ -128,14 +112,7 @@ def core_distance(
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
         before = p_1 - 1
         for k in range(p_0, p_1):
-            e_x, e_y = from_segment(
-                at_x,
-                at_y,
-                solids.edges[before, 0],
-                solids.edges[before, 1],
-                solids.edges[k, 0],
-                solids.edges[k, 1],
-            )
+            e_x, e_y = from_segment(at_x, at_y, solids.edges, before, k)
             if e_x * e_x + e_y * e_y < best:
                 best, axis_x, axis_y = e_x * e_x + e_y * e_y, e_x, e_y
             before = k
@@ -147,14 +124,7 @@ def core_distance(
         at_x, at_y = c * d_x + s * d_y, c * d_y - s * d_x
         before = b_1 - 1
         for k in range(b_0, b_1):
-            e_x, e_y = from_segment(
-                at_x,
-                at_y,
-                body.edges[before, 0],
-                body.edges[before, 1],
-                body.edges[k, 0],
-                body.edges[k, 1],
-            )
+            e_x, e_y = from_segment(at_x, at_y, body.edges, before, k)
             # Here the vector leads from the body to the solid, in the body's frame.
             if e_x * e_x + e_y * e_y < best:
                 best = e_x * e_x + e_y * e_y
@@ -168,19 +138,11 @@ def core_distance(
 
 @bare_inner_kernel
 def piece_clearance(
-    body: Body,
-    b: int,
-    place: Place,
-    solids: Solids,
-    p: int,
-    near: float,
-    enough: float,
+    body: Body, b: int, place: Place, solids: Solids, p: int, near: float, enough: float
 ) -> tuple[float, float, float]:
-    """Clearance of one piece of the body to one solid, and its direction.
-
-    A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
-    exact above `enough`.
-    """
+    """Clearance of one piece of the body to one solid, and its direction."""
+    # A lower bound; exact where it is a small share of `near`, at most 0 on contact, rough above
+    # `enough`.
     # A rounded polygon is a core that is grown by a radius, so the clearance of two is the distance
     # of their cores less both radii. `enough` is asked of the rounded ones, so the cores are asked
     # for more.
@@ -264,10 +226,7 @@ def square_to_plate(solids: Solids, p: int, x: float, y: float) -> float:
 
 @bare_inner_kernel
 def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, most: float) -> float:
-    """Clearance to the solids near the body, exact below `near`; at most the buckets' reach.
-
-    What is not nearer than `most` is not looked at.
-    """
+    """Clearance to solids near the body, exact below `near`; at most `most`, the buckets' reach."""
     buckets, solids = world.buckets, world.solids
     x, y, c, s = place
     m_x = x + c * body.middle_x - s * body.middle_y
@@ -294,11 +253,9 @@ def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, mo
 
 @bare_inner_kernel
 def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> float:
-    """When a corner comes down to `limit` along an axis, driven by a constant twist.
-
-    Without `turn` its height is ``a + ahead t``; with it, it is on a circle, (a, b) along the axis
-    and aside from the centre, whose height is `ahead`.
-    """
+    """When a corner comes down to `limit` along an axis, driven by a constant twist."""
+    # Without `turn` its height is ``a + ahead t``; with it, it is on a circle, (a, b) along the
+    # axis and aside from the centre, whose height is `ahead`.
     # The height of a corner that is driven straight is linear; one that does not come down never
     # meets the limit.
     if turn == 0.0:
@@ -318,13 +275,10 @@ def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> 
 
 @bare_inner_kernel
 def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, most: float) -> bool:
-    """Whether a corner on a circle, as in `corner_time`, surely does not meet `limit` by `most`.
-
-    Its height after an angle is ``ahead + a cos(angle) - b sin(angle)``, the angle with the sign of
-    the turn. The parabola that has its height, its slope and its second derivative now is off by no
-    more than ``radius angle^3 / 6``.
-    Source: Taylor's theorem, Lagrange's form of the remainder.
-    """
+    """Whether a corner on a circle, as in `corner_time`, surely does not meet `limit` by `most`."""
+    # Its height after an angle, signed as the turn, is ``ahead + a cos(angle) - b sin(angle)``. The
+    # parabola of its height, slope and second derivative now is off by ``radius angle^3 / 6`` at
+    # most (Taylor's theorem, Lagrange's form of the remainder).
     angle = turn * most
     size = abs(a) + abs(b)  # not below the radius
     # Where the parabola is convex its chord may lie above it, and its tangent does not.
@@ -345,11 +299,7 @@ def axis_time(
     lasts: float,
     most: float,
 ) -> float:
-    """How long a piece of the body stays apart along a fixed axis: until it is nearer by `drop`.
-
-    Need not be exact where it is `lasts` at most, which is known to hold, nor where it is `most` at
-    least.
-    """
+    """How long a piece stays apart along an axis: until nearer by `drop`; in [`lasts`, `most`]."""
     x, y, c, s = place
     center_x, center_y, v_x, v_y, turn = course
     axis_x, axis_y = axis
@@ -395,17 +345,15 @@ def near_step(
     near: float,
     most: float,
 ) -> tuple[float, float]:
-    """How long the motion that goes on from here stays free of what is near, at most `most` [s].
-
-    Every solid keeps apart for its clearance over the body's speed, or for as long as the axis
-    between the two parts them (not asked for if the turn is inf). Also a lower bound of the
-    clearance. The time is -1 if a clearance is at most `margin`.
-    """
+    """How long the motion that goes on from here stays free of what is near, at most `most` [s]."""
+    # Also a lower bound of the clearance. Every solid keeps apart for its clearance over the speed,
+    # or as long as the axis between the two parts them (not asked for if the turn is inf). The time
+    # is -1 if a clearance is at most `margin`.
     buckets, solids = world.buckets, world.solids
     x, y, c, s = place
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
-    near_enough = near + keep / SHARP  # clearances are exact where the distance to keep begins
+    exact = near + keep / SHARP  # clearances are exact where the distance to keep begins
     # Solids that are in no list of this cell are further away than this.
     nearest = buckets.reach - keep
     if nearest <= margin:  # the distance to keep is beyond what the buckets know
@@ -425,9 +373,7 @@ def near_step(
             continue
         for b in range(body.first.shape[0] - 1):
             enough = step * speed + keep
-            clearance, axis_x, axis_y = piece_clearance(
-                body, b, place, solids, p, near_enough, enough
-            )
+            clearance, axis_x, axis_y = piece_clearance(body, b, place, solids, p, exact, enough)
             clearance -= keep
             nearest = min(nearest, clearance)
             # Too near at this pose: the proof ends here.

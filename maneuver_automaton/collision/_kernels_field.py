@@ -15,10 +15,7 @@ from maneuver_automaton.collision.convex import Solids
 
 @kernel
 def write_pieces(field: Field, solids: Solids, n: int) -> None:
-    """Lower the distances of a field to those of each of the first `n` solids.
-
-    They are negative inside a convex polygon, whose corners are counter-clockwise.
-    """
+    """Lower a field to the distances of each of the first `n` solids, negative inside a polygon."""
     cell, cap = field.cell, field.outside
     edges, first, plates = solids.edges, solids.first, solids.plates
     rows, columns = field.distance.shape
@@ -90,11 +87,7 @@ def to_cells(
     y: float,
     most: float,
 ) -> float:
-    """Distance of a point, in cells, to the nearest cell that is as `wanted`; at most `most`.
-
-    `away` are the rows of `rows_to`. Columns ever further away are looked at, as long as they can
-    be nearer.
-    """
+    """Distance of a point, in cells, to the nearest that is as `wanted`; at most `most`."""
     n_rows, n_columns = blocked.shape
     row = min(max(math.floor(y), 0), n_rows - 1)
     column = min(max(math.floor(x), 0), n_columns - 1)
@@ -124,11 +117,9 @@ def to_cells(
 
 @kernel
 def write_map(field: Field, blocked: NDArray[np.bool_], resolution: float, place: Place) -> None:
-    """Lower the distances of a field to the exact ones of a map in its place, negative inside.
-
-    In two passes: along each column the rows to the nearest cell, then the least hypotenuse over
-    the columns, to the cells' edges.
-    """
+    """Lower the distances of a field to the exact ones of a map in its place, negative inside."""
+    # Two passes: along each column the rows to the nearest cell, then the least hypotenuse over
+    # columns.
     distance, cell = field.distance, field.cell
     origin_x, origin_y = field.origin_x, field.origin_y
     m_x, m_y, c, s = place

@@ -7,7 +7,12 @@ import math
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
-from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
+from maneuver_automaton.collision._kernels_slabs import (
+    apart_during,
+    pose_after,
+    slabs_during,
+    swept_box,
+)
 from maneuver_automaton.collision.arrays import Coast, MovingObstacles, Place
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
@@ -43,24 +48,12 @@ def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
 @bare_inner_kernel
 def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, float, float]:
     """Pose (x, y, heading) of a moving obstacle, held before its first knot and after."""
-    k_0, k_1 = moving.first_knot[m], moving.first_knot[m + 1]
-    if time <= moving.time[k_0]:
-        return moving.pose[k_0, 0], moving.pose[k_0, 1], moving.pose[k_0, 2]
-    if time >= moving.time[k_1 - 1]:
-        k = k_1 - 1
-        return moving.pose[k, 0], moving.pose[k, 1], moving.pose[k, 2]
-    low = knot_before(moving, m, time)
-    if moving.arcs[m]:
-        r_x, r_y, r_turn = moving.rate[low, 0], moving.rate[low, 1], moving.rate[low, 2]
-        d_x, d_y, turn = coast(r_x, r_y, r_turn, time - moving.time[low])
-        x, y, heading = moving.pose[low, 0], moving.pose[low, 1], moving.pose[low, 2]
-        return compose(x, y, heading, d_x, d_y, turn)
-    high = low + 1
-    share = (time - moving.time[low]) / (moving.time[high] - moving.time[low])
-    x = moving.pose[low, 0] + share * (moving.pose[high, 0] - moving.pose[low, 0])
-    y = moving.pose[low, 1] + share * (moving.pose[high, 1] - moving.pose[low, 1])
-    heading = moving.pose[low, 2] + share * (moving.pose[high, 2] - moving.pose[low, 2])
-    return x, y, heading
+    k, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
+    if time >= moving.time[last]:
+        k = last
+    elif time > moving.time[k]:
+        k = knot_before(moving, m, time)
+    return pose_after(moving, m, k, time)
 
 
 @bare_inner_kernel
@@ -73,11 +66,7 @@ def closing_of(
     time: float,
     most: float,
 ) -> tuple[float, float]:
-    """How fast a body and an obstacle come together at most, and for how long that holds.
-
-    Seen at a `time` of the motion, when the body has a `heading`. It holds to the next knot, no
-    longer than `most` [s].
-    """
+    """How fast a body and an obstacle come together at most, and for how long that holds."""
     v_x, v_y, turn_rate = motion.v_x, motion.v_y, motion.turn_rate
     sign = 1.0 if motion.duration >= 0.0 else -1.0  # the direction of time
     k_0, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
@@ -126,10 +115,7 @@ def moving_clearance(
     keep: float,
     enough: float,
 ) -> float:
-    """Clearance to one moving obstacle at `time`: a lower bound, not exact above `enough`.
-
-    Exact around the distance `keep` too.
-    """
+    """Clearance to a moving obstacle at `time`: a bound, exact around `keep`, up to `enough`."""
     x, y, heading = pose
     o_x, o_y, o_heading = obstacle_pose(moving, m, time)
     d_x, d_y = x - o_x, y - o_y
@@ -167,12 +153,10 @@ def moving_clearance(
 def free_of_moving(
     moving: MovingObstacles, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float]:
-    """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance.
-
-    Those that are too far away to be met are passed over, by where they may be in the meantime:
-    the body never comes as near to them as it would stop at. Each of the others is followed by
-    itself, as long as it is there.
-    """
+    """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance."""
+    # Those too far away to be met, by where they may be in the meantime, are passed over: the body
+    # never comes as near to them as it would stop at. The others are followed as long as they are
+    # there.
     x, y, heading, v_x, v_y, turn_rate, speed, duration, clock = motion
     sign = 1.0 if duration >= 0.0 else -1.0
     free, nearest = abs(duration), math.inf

@@ -27,11 +27,8 @@ def bulge(length: float, d_x: float, d_y: float) -> float:
 
 
 @bare_inner_kernel
-def middle_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[float, float]:
-    """Place of an obstacle's middle at a time, as the motion after knot `k` has it.
-
-    Before the first knot, and after the last, it stands there.
-    """
+def pose_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[float, float, float]:
+    """Pose of an obstacle at a time, as the motion after knot `k` has it."""
     x, y, heading = moving.pose[k, 0], moving.pose[k, 1], moving.pose[k, 2]
     since = time - moving.time[k]
     if since > 0.0 and k + 1 < moving.first_knot[m + 1]:
@@ -44,6 +41,13 @@ def middle_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[
             x += share * (moving.pose[k + 1, 0] - x)
             y += share * (moving.pose[k + 1, 1] - y)
             heading += share * (moving.pose[k + 1, 2] - heading)
+    return x, y, heading
+
+
+@bare_inner_kernel
+def middle_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[float, float]:
+    """Place of an obstacle's middle at a time, as the motion after knot `k` has it."""
+    x, y, heading = pose_after(moving, m, k, time)
     c, s = math.cos(heading), math.sin(heading)
     m_x, m_y = moving.middle[m, 0], moving.middle[m, 1]
     return x + c * m_x - s * m_y, y + s * m_x + c * m_y
@@ -151,16 +155,11 @@ def swept_box(body: Body, motion: Coast) -> tuple[float, float, float, float]:
 
 @bare_inner_kernel
 def apart_during(
-    slabs: Slabs,
-    n: int,
-    m: int,
-    during: tuple[int, int],
-    swept: tuple[float, float, float, float],
+    slabs: Slabs, n: int, m: int, during: tuple[int, int], swept: tuple[float, float, float, float]
 ) -> float:
-    """How far obstacle `m` of `n` stays from a body's middle in two slabs, at least; else below 0.
-
-    The proof: in these slabs it is inside its boxes, and the middle inside the box that is `swept`.
-    """
+    """Least distance of obstacle `m` of `n` from a body's middle in two slabs; else below 0."""
+    # The proof: in these slabs it is inside its boxes, and the middle inside the box that is
+    # `swept`.
     a, b = slabs.first + during[0] * n + m, slabs.first + during[1] * n + m
     box = slabs.box
     in_a: float = max(

@@ -22,11 +22,9 @@ FREE, UNKNOWN = -1, -2  # in place of the solid that is not parted from a motion
 
 @inner_kernel
 def hull_of(points: Array, n: int, hull: Array) -> int:
-    """Corners of the convex hull of `n` points, counter-clockwise; how many. Sorts the points.
-
-    `hull` has room for twice as many.
-    Source: Andrew (1979), *Another efficient algorithm for convex hulls in two dimensions*.
-    """
+    """Corners of the convex hull of `n` points, counter-clockwise; how many. Sorts the points."""
+    # `hull` has room for twice as many. Andrew (1979), *Another efficient algorithm for convex
+    # hulls in two dimensions*.
     for k in range(1, n):
         x, y = points[k, 0], points[k, 1]
         j = k
@@ -59,11 +57,9 @@ def hull_of(points: Array, n: int, hull: Array) -> int:
 def sweep(
     edges: Array, first: IntArray, radius: Array, twists: Array, durations: Array
 ) -> tuple[Array, IntArray, Array]:
-    """The rows of `SweptAreas` for every twist (m, 3 or more) and duration (m, k), signs included.
-
-    A corner that turns is between the chord of its arc and the tangents at both ends and in the
-    middle, so what these corners span holds all that the body covers.
-    """
+    """The rows of `SweptAreas` for every twist (m, 3 or more) and signed duration (m, k)."""
+    # A corner that turns is between the chord of its arc and the tangents at both ends and in the
+    # middle, so what these corners span holds all that the body covers.
     n_pieces = first.shape[0] - 1
     n_motions = durations.shape[0] * durations.shape[1]
     most = 4 * edges.shape[0]
@@ -93,10 +89,8 @@ def sweep(
                 u_x, u_y = along * (v_x - turn_rate * y), along * (v_y + turn_rate * x)
                 points[n, 0], points[n, 1] = x, y
                 points[n + 1, 0], points[n + 1, 1] = x + u_x, y + u_y
-                points[n + 2, 0], points[n + 2, 1] = (
-                    e_x - c * u_x + s * u_y,
-                    e_y - s * u_x - c * u_y,
-                )
+                points[n + 2, 0] = e_x - c * u_x + s * u_y
+                points[n + 2, 1] = e_y - s * u_x - c * u_y
                 points[n + 3, 0], points[n + 3, 1] = e_x, e_y
                 n += 4
             m = hull_of(points, n, hull)
@@ -137,17 +131,9 @@ def sweep(
 
 @bare_inner_kernel
 def not_parted(
-    world: WorldArrays,
-    body: Body,
-    swept: SweptAreas,
-    motion: int,
-    place: Place,
-    enough: float,
+    world: WorldArrays, body: Body, swept: SweptAreas, motion: int, place: Place, enough: float
 ) -> int:
-    """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
-
-    The motion begins at `place`. UNKNOWN where it covers more than the bucket knows.
-    """
+    """A solid not parted by more than `enough` from all that a motion covers; FREE, or UNKNOWN."""
     x, y, c, s = place
     # FREE is a proof for the whole motion: its polygons hold all that the body covers, the lists of
     # the buckets all solids within `reach`, and along an axis each is farther than `enough`.

@@ -128,16 +128,11 @@ def _held(body: Any, solid: Any) -> Iterator[tuple[float, float]]:
         (x, y), _ = shapely.get_coordinates(shapely.shortest_line(body, solid))
         yield math.hypot(x, y), -float(shapely.distance(body, solid))
         return
-    inside = [shapely.get_coordinates(part.representative_point()) for part in _parts(both)]
+    parts = [one for one in shapely.get_parts(both) if one.area > 0.0]
+    inside = [shapely.get_coordinates(part.representative_point()) for part in parts]
     points = np.concatenate([*inside, shapely.get_coordinates(both)])
     depths = shapely.distance(shapely.points(points), shapely.boundary(solid))
     yield from zip(np.hypot(*points.T).tolist(), depths.tolist(), strict=True)
-
-
-def _parts(whole: Any) -> list[Any]:
-    import shapely
-
-    return [one for one in shapely.get_parts(whole) if one.area > 0.0]
 
 
 def _solid_near(obstacles: tuple[AnyObstacle, ...], place: Array, reach: float) -> Any:

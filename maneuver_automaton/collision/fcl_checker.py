@@ -372,10 +372,8 @@ def _box_skin(ring: Array) -> Skin:
 
 
 def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Array, Array]:
-    """Corners (n, 2) of boxes around the places of coasts [m].
-
-    From each place the ways to both ends are together no longer than the coast: an ellipse.
-    """
+    """Corners (n, 2) of boxes around the places of coasts [m]."""
+    # From each place the ways to both ends are together no longer than the coast: an ellipse.
     lasting = np.minimum(durations, math.tau / np.maximum(np.abs(twists[:, 2]), LEAST_TURN))
     begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
     ends = after(starts, displacements(twists, lasting))[:, :2]

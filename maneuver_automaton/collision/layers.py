@@ -165,10 +165,7 @@ def _concatenated(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[
             firsts.append(solids.first[1:] + n_edges)
             n_edges += len(solids.edges)
             n_pieces += len(solids.plates)
-    return (
-        Solids(np.concatenate(edges), np.concatenate(firsts), np.concatenate(plates)),
-        *begins,
-    )
+    return (Solids(np.concatenate(edges), np.concatenate(firsts), np.concatenate(plates)), *begins)
 
 
 def _all_moving(

@@ -16,12 +16,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.motion import STANDS, Motion, point_speeds
 from maneuver_automaton.collision.outline import outlines
-from maneuver_automaton.collision.shapes import (
-    AnyObstacle,
-    Disc,
-    OccupancyMap,
-    Shape,
-)
+from maneuver_automaton.collision.shapes import AnyObstacle, Disc, OccupancyMap, Shape
 from maneuver_automaton.groups import SE2
 
 

@@ -117,9 +117,7 @@ def set_task(call: FirstCallArrays, task: Task, margin: float) -> Task:
         task.estimates,
         task.connecting,
         Truncation(
-            task.truncation.kept,
-            max(call.margins.back_off, 2.0 * margin),
-            task.truncation.shortest,
+            task.truncation.kept, max(call.margins.back_off, 2.0 * margin), task.truncation.shortest
         ),
         task.limits,
         task.stop_at_first,
@@ -131,10 +129,7 @@ def set_task(call: FirstCallArrays, task: Task, margin: float) -> Task:
 def set_grid(
     call: FirstCallArrays, scene: Scene, grid: DistanceGrid, aims: Array, aim: Array
 ) -> DistanceGrid:
-    """The distances of a query in memory that is there, none known but those of the aims.
-
-    With more cells than there is memory for it has no columns.
-    """
+    """The distances of a query in memory that is there; without columns where that is too small."""
     field, box = scene.layers.plane, call.window_box
     was, walls = grid.layout, grid.walls
     cell, stride = was.cell, was.stride
@@ -170,11 +165,9 @@ def set_grid(
 
 @bare_kernel
 def begin_search(call: FirstCallArrays, search: LatticeSearch) -> int:
-    """See the ends of a query, and expand up to `call.asked[0]` nodes from the start.
-
-    Returns -1 where the ends are not clearly free, or the window is too large for the memory: then
-    nothing is begun. Otherwise whether the search may go on, as `expanded`.
-    """
+    """See the ends of a query, expand up to `call.asked[0]` nodes; whether more, as `expanded`."""
+    # -1, and nothing is begun, where the ends are not clearly free or the window exceeds the
+    # memory.
     scene, margins = search.scene, call.margins
     if not see_ends(call, scene, search.library):
         return NOT_BEGUN

@@ -35,14 +35,7 @@ Ways = tuple[complex, complex, complex]
 # and arm where that turns; the price of the free trim and of the triple; phases and lengths of
 # at_1 and at_2.
 ClosedForm = tuple[
-    tuple[int, float],
-    tuple[complex, float],
-    Three,
-    Ways,
-    tuple[complex, complex],
-    Ways,
-    Four,
-    Four,
+    tuple[int, float], tuple[complex, float], Three, Ways, tuple[complex, complex], Ways, Four, Four
 ]
 
 COARSE = 2  # stretches of all cells of a word, which are looked at first
@@ -51,13 +44,11 @@ PARTS = 8  # of a cell, for which bounds are computed in the end
 
 @inner_kernel
 def mark_cheap_cells(known: ClosedForm, reach: float, most: float, live: NDArray[np.bool_]) -> bool:
-    """Fill `live` (2, nodes): cells of the free time, in which a branch may cost less than `most`.
-
-    The cells part [0, reach] evenly; `most` is without what the word costs besides coasting. Many
-    are looked at together, and apart only where some may be cheap: in the end in parts, because
-    bounds get close as cells get small, and a bound takes less than a node of the scan. False if
-    no cell is live.
-    """
+    """Fill `live` (2, nodes): cells of the free time where a branch may cost less than `most`."""
+    # They part [0, reach] evenly; `most` is without what the word costs besides coasting. Many are
+    # looked at together, and apart only where some may be cheap: in the end in parts, because
+    # bounds get close as cells get small, and a bound takes less than a node of the scan. False if
+    # none is live.
     live[:] = False
     found = False
     parts = PARTS * live.shape[1]
@@ -93,11 +84,9 @@ def mark_cheap_cells(known: ClosedForm, reach: float, most: float, live: NDArray
 
 @bare_inner_kernel
 def has_bounds(problem: WordProblem, word: IntArray, triple: IntArray, q: int) -> bool:
-    """Whether bounds are known for a word whose time at `q` is free.
-
-    Not where two straights are solved for, or the free trim comes last, or turns between those that
-    are solved for, or where coasting pays.
-    """
+    """Whether bounds are known for a word whose time at `q` is free."""
+    # Not where two straights are solved for, or the free trim comes last, or turns between those
+    # that are solved for, or where coasting pays.
     straights = 0
     for s in range(3):
         trim = word[triple[s]]
@@ -153,12 +142,9 @@ def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) 
 
 @bare_inner_kernel
 def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, float]:
-    """Lower bounds of what coasting costs in a word whose free time is from `low` to `high`.
-
-    For both branches of the closed form, as in `steer`: with three turns
-    ``at_1 e^{i h_1} + at_2 e^{i h_2} = d``, the headings after the first and after the second of
-    the three being unknown; a straight brings its time as the unknown instead.
-    """
+    """Lower bounds of what coasting costs in a word whose free time is from `low` to `high`."""
+    # For both branches of the closed form, as in `steer`: three turns are ``at_1 e^{i h_1} + at_2
+    # e^{i h_2} = d``, the headings after the first two unknown; a straight brings its time instead.
     (place, heading), (v_q, w_q), turn_rates, velocities, (at_1, at_2), ways, rates, polar = known
     phase_1, phase_2, one, two = polar
     v_a, v_b, v_c = velocities

@@ -85,11 +85,9 @@ def corner(one: float, other: float, d: float) -> float:
 
 @bare_inner_kernel
 def widest_corner(one: float, other: float, low: float, high: float) -> float:
-    """Largest angle between the side `one` and one from `low` to `high`, but for the two ends.
-
-    Its cosine ``(one / d + d / one - other^2 / (d one)) / 2`` has its only least value, if any,
-    where ``d^2 = one^2 - other^2``; its largest one is at an end. 0 if that is not between.
-    """
+    """Largest angle between the side `one` and one from `low` to `high`, but for the two ends."""
+    # Its cosine ``(one / d + d / one - other^2 / (d one)) / 2`` has its only least value, if any,
+    # where ``d^2 = one^2 - other^2``; its largest one is at an end. 0 if that is not between.
     square = (one - other) * (one + other)
     return arc(math.sqrt(square) / one) if low * low < square < high * high else 0.0
 
@@ -105,10 +103,8 @@ def three_turns(
     turn_rates: Three,
     prices: Three,
 ) -> tuple[float, float]:
-    """Lower bounds for three turns: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` lies in a disc about `d`.
-
-    `polar` has the phases and the lengths of at_1 and at_2.
-    """
+    """Lower bounds of three turns: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` in a disc about `d`."""
+    # `polar` has the phases and the lengths of at_1 and at_2.
     phase_1, phase_2, one, two = polar
     way, aim = abs(d), phase(d)
     low = max(way - around, abs(one - two), TINY * (one + two))
@@ -152,10 +148,8 @@ def straight_between(
     turn_rates: tuple[float, float],
     prices: Three,
 ) -> tuple[float, float]:
-    """Lower bounds for turn, straight, turn: ``(still + velocity t) e^{i h}`` in a disc about `d`.
-
-    Along the straight the vector is (along, aside), of which only the first changes.
-    """
+    """Lower bounds of turn, straight, turn: ``(still + velocity t) e^{i h}`` in a disc at `d`."""
+    # Along the straight the vector is (along, aside), of which only the first changes.
     speed = abs(velocity)
     if not speed > 0.0:
         return 0.0, 0.0
@@ -194,11 +188,8 @@ def straight_between(
 def on_line_and_circle(
     point: complex, velocity: complex, radius: float, within: float
 ) -> tuple[Four, Four]:
-    """Where ``point - velocity t`` has the length `radius`, the point being in a disc.
-
-    Later and earlier: from and to which time, and from and to which angle to the velocity; a time
-    below zero for none.
-    """
+    """Where ``point - velocity t`` has the length `radius`, the point being in a disc."""
+    # Later and earlier: the times from and to, and the angles to the velocity; below zero for none.
     speed = abs(velocity)
     if not speed > 0.0 or not radius > TINY * within:
         return (0.0, math.inf, 0.0, 7.0), (0.0, math.inf, 0.0, 7.0)

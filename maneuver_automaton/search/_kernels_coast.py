@@ -29,11 +29,9 @@ LOOKS = 40  # poses of a coast that are looked at, at most
 def inside_window(
     window: Array, x: float, y: float, heading: float, twist: Array, t: float
 ) -> bool:
-    """Whether a motion stays inside [low x, low y, high x, high y], seen from the bounds' frame.
-
-    `window` (9,) is those four, the frame's (x, y, cos, sin) that take a pose of the world to it,
-    and what the pose may be outside [m].
-    """
+    """Whether a motion stays inside a window (9,) as the bounds' frame sees it."""
+    # The window is [low x, low y, high x, high y], the frame's (x, y, cos, sin) that take a pose of
+    # the world to it, and what the pose may be outside [m].
     # a is the pose where the motion begins, seen from the frame, e the one where it ends. The box
     # [low, high] holds both, and grows by the extreme points of the arc between them.
     v_x, v_y, turn = twist[0], twist[1], twist[2]
@@ -114,13 +112,11 @@ def part_free(
     motion: tuple[Array, float, float, float],
     asked: tuple[float, float, float],
 ) -> tuple[float, float]:
-    """How long a part with an `offset` on a vehicle at `place` is free; the last clearance.
-
-    `motion` is a constant twist, the speed of the part's fastest point, on which the proof rests,
-    when the motion begins after the vehicle was at `place`, and how long it lasts [s]; both times
-    are negative for one that is driven backwards in time. `asked` are the distance to keep, the
-    clearance beyond it that a proof needs, and the world's time at `place`.
-    """
+    """How long a part with an `offset` on a vehicle at `place` is free; the last clearance."""
+    # `motion`: constant twist, speed of the part's fastest point, on which the proof rests, begin
+    # after the vehicle was at `place`, and duration [s]; both negative for one driven backwards in
+    # time. `asked`: distance to keep, clearance beyond it that a proof needs, the world's time at
+    # `place`.
     twist, speed, begin, t = motion
     keep, margin, clock = asked
     v_x, v_y, turn = twist[0], twist[1], twist[2]
@@ -147,12 +143,10 @@ def coast_proven(
     t: float,
     clock: float,
 ) -> tuple[float, float]:
-    """How long coasting a trim from a pose (x, y, heading, z) is proven free; the last clearance.
-
-    A negative `t` drives the motion backwards, and the world's clock too. The time that comes back
-    has no sign. One body among obstacles in one plane has a line of its own: it is asked for at
-    every edge, and to choose a part and a layer copies more than the proof takes.
-    """
+    """How long coasting from a pose (x, y, heading, z) is proven free; the last clearance."""
+    # A negative `t` drives the motion backwards, and the world's clock too; what comes back has no
+    # sign. One body among obstacles in one plane has a line of its own: it is asked for at every
+    # edge, and to choose a part and a layer copies more than the proof takes.
     if is_one_in_plane(scene, lib):
         twist, fastest = lib.library.twists[trim], lib.parts.fastest[trim]
         x, y, heading, _ = pose
@@ -168,11 +162,9 @@ def coast_proven(
 def edge_swept(
     scene: Scene, lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
 ) -> int:
-    """A solid that may be in the way of an edge of coasting, FREE for none, or UNKNOWN.
-
-    `motion` is its place in `lib.coasts.swept`. FREE is a proof, and what it calls free
-    `coast_proven` would too: no pose along the edge comes as near to a solid as it would stop at.
-    """
+    """A solid that may be in the way of an edge of coasting, FREE for none, or UNKNOWN."""
+    # `motion`: place in `lib.coasts.swept`. FREE is a proof, and what it calls free `coast_proven`
+    # would too: no pose along the edge comes as near to a solid as it would stop at.
     if not is_one_in_plane(scene, lib):
         return UNKNOWN
     place = Place(pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
@@ -202,10 +194,8 @@ def coast_proven_everywhere(
     t: float,
     clock: float,
 ) -> tuple[float, float]:
-    """`coast_proven` for several parts, in every layer that the altitude passes, and among zones.
-
-    A layer counts while the altitude is in it, so that a climb is no cylinder.
-    """
+    """`coast_proven` for several parts, in every layer that the altitude passes, among zones."""
+    # A layer counts while the altitude is in it, so that a climb is no cylinder.
     # `free` is how long all that was looked at is free: each part and layer is asked for no more,
     # so the least of them remains, and all of it is proven. `nearest` is the clearance at the end:
     # only layers that the vehicle is in there count.
@@ -258,10 +248,8 @@ def coast_inside(
 def coast_hits(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> bool:
-    """Whether coasting a trim surely is not free: poses about a body's width apart are looked at.
-
-    What hits cannot be proven free, and a look at the field costs a small part of a proof.
-    """
+    """Whether coasting surely is not free: poses about a body's width apart are looked at."""
+    # What hits cannot be proven free, and a look at the field costs a small part of a proof.
     body, twist = lib.parts.body, lib.library.twists[trim]
     if not body.half_width > 0.0 or not is_one_in_plane(scene, lib):
         return False
@@ -328,10 +316,7 @@ def coast_free(
 def clear_of_static(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> bool:
-    """Whether coasting is proven free of all that never moves; asked of one body in one plane.
-
-    What it calls blocked `coast_free` does at any time.
-    """
+    """Whether coasting is proven free of all that never moves; asked of one body in one plane."""
     if not is_one_in_plane(scene, lib):
         return True
     twist, fastest = lib.library.twists[trim], lib.parts.fastest[trim]

@@ -35,12 +35,10 @@ def edge_proven(
     pose: tuple[float, float, float, float],
     clock: float,
 ) -> float:
-    """Least clearance at the end of a maneuver, -1 if it is not proven free.
-
-    Each piece of its course moves by one twist. The true motion deviates from it by at most
-    its `error`, which is kept in addition to `keep`: so the proof holds for the true motion.
-    A layer counts for all of a piece that is in it.
-    """
+    """Least clearance at the end of a maneuver, -1 if it is not proven free."""
+    # Each piece of its course moves by one twist. The true motion deviates from it by at most its
+    # `error`, kept in addition to `keep`: so the proof holds for the true motion. A layer counts
+    # for all of a piece that is in it.
     # Pieces of part p along an edge are those from `first[p * n_edges + edge]` to the next
     # entry; their times add up to `time`. `nearest` is the clearance after the last of them.
     x, y, heading, z = pose
@@ -139,17 +137,9 @@ def transition_free(
 
 @bare_shared_kernel
 def connection_free(
-    scene: Scene,
-    lib: LatticeArrays,
-    joint: Joint,
-    word: IntArray,
-    climb: int,
-    times: Array,
+    scene: Scene, lib: LatticeArrays, joint: Joint, word: IntArray, climb: int, times: Array
 ) -> bool:
-    """Whether a connection is free all the way: three trims, a climb, and the trim of its goal.
-
-    A trim of the word that is none, or the turn in place of a free heading, is passed over.
-    """
+    """Whether a connection is free all the way: three trims, a climb, and the trim of its goal."""
     # Most words are not free. Where no transition comes between, a look along all of a word says so
     # of most of these, before any part of it is proven.
     pose, one_class = joint.pose, lib.library.transitions.cost.shape[0] == 1
@@ -196,10 +186,7 @@ def connection_place(
     times: Array,
     enough: float,
 ) -> float:
-    """Price of the places along a connection, its transitions included, as `connection_free`.
-
-    Of a part of it, where that costs `enough` already.
-    """
+    """Price of places along a connection, as `connection_free`; of a part that is `enough`."""
     pose, before, total = joint.pose, joint.before, 0.0
     for n in range(5):
         trim, t = joint.after, 0.0
@@ -225,18 +212,10 @@ def connection_place(
 
 @bare_inner_kernel
 def free_candidate(
-    scene: Scene,
-    lib: LatticeArrays,
-    words: IntArray,
-    joint: Joint,
-    n: int,
-    scratch: Scratch,
+    scene: Scene, lib: LatticeArrays, words: IntArray, joint: Joint, n: int, scratch: Scratch
 ) -> int:
-    """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
-
-    A candidate that was tried costs inf from then on. Where places cost something, they are added
-    to what the one that is returned costs, and it is the cheapest with them.
-    """
+    """Cheapest of `n` candidates that is proven free, places priced; -1 if none soon is."""
+    # A candidate that was tried costs inf from then on.
     # The least is sought anew each time: few are tried, so that sorting all would cost more.
     # Without the places a candidate costs less than with them: once the next one costs more than
     # the best does with them, no other is better.

@@ -23,10 +23,8 @@ LISTED, N_SETTLED, AT_RIM, FAR, WRITTEN, NOW = range(6)  # places in `grid.state
 def grid_layout(
     origin: float, low: float, high: float, cell: float, field_cell: float, stride: int
 ) -> tuple[int, int, float]:
-    """Along one axis: the first cell, how many there are, and where the first begins [m].
-
-    Of cells of `stride` cells of the field, whose origin it is, from `low` to `high`.
-    """
+    """Along one axis: the first cell, how many there are, and where the first begins [m]."""
+    # Of cells of `stride` cells of the field, whose origin it is, from `low` to `high`.
     origin -= (stride // 2) * field_cell
     first = math.floor((low - origin) / cell)
     last = math.floor((high - origin) / cell)  # the far rim belongs to it too
@@ -78,10 +76,8 @@ def pop(keys: Array, items: IntArray, size: int) -> int:
 
 @bare_inner_kernel
 def centre_clearance(grid: DistanceGrid, field: Field, i: int, j: int) -> float:
-    """Clearance of a point in the middle of a cell [m], negative inside a solid.
-
-    -inf where no point of the cell is inside the window: no wall stands there, but a bound.
-    """
+    """Clearance of a point in the middle of a cell [m], negative inside a solid."""
+    # -inf where no point of the cell is inside the window: no wall stands there, but a bound.
     at, window = grid.layout, grid.window
     x = at.origin_x + (i + 0.5) * at.cell - window[4]
     y = at.origin_y + (j + 0.5) * at.cell - window[5]
@@ -174,20 +170,15 @@ def _next_cell(grid: DistanceGrid) -> int:
 
 @bare_inner_kernel
 def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
-    """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no path.
-
-    Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
-    may pass between the middles of two cells although neither is blocked (the body is small and
-    the wall thin), a path through costs `walls.detour` more in `rank`, by which paths are compared.
-    `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
-    the cells cannot show. Both are whole numbers: the same whatever was asked for before.
-
-    Where places cost something a metre counts so much more as it costs more there, at least.
-
-    Grows until that cell is settled, in the order of the rank plus the octile way to where the
-    grid is aimed at, so that cells far from the path are not looked at. The state of the search is
-    kept in the grid: the next call goes on from it.
-    """
+    """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no path."""
+    # Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
+    # may pass between the middles of two open cells (the body is small and the wall thin), a path
+    # through costs `walls.detour` more in `rank`, by which paths are compared; `value` keeps the
+    # length alone, which is compared with costs. Both are whole numbers: the same whatever was
+    # asked for before. A metre counts so much more as places cost more there, at least. Grows until
+    # that cell is settled, in the order of the rank plus the octile way to where the grid is aimed
+    # at, so that cells far from the path are not looked at; the next call goes on from the state
+    # kept in the grid.
     # Of the arrays of the grid, one entry a cell: `mark`; `rank` and `value`, the least known so
     # far, final once the cell is settled. Neither holds anything before the mark says so: a large
     # grid of which little is used is not filled first. A cell may stand in the open list several
@@ -292,11 +283,10 @@ def open_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
 
 @kernel
 def corner_path(grid: DistanceGrid, field: Field, goals: Array, x: float, y: float) -> float:
-    """Length [m] of the shortest octile path between the corners nearest to (x, y) and a goal.
-
-    A* over corners, from the goals to the end: along an edge that an open cell touches, and across
-    open cells. Where the rim of the grid may be left, a path along it is as good as any outside.
-    """
+    """Length [m] of the shortest octile path between the corners nearest to (x, y) and a goal."""
+    # A* over corners, from the goals to the end: along an edge that an open cell touches, and
+    # across open cells. Where the rim of the grid may be left, a path along it is as good as any
+    # outside.
     at = grid.layout
     columns, rows = at.columns + 1, at.rows + 1  # of corners
     value = np.full(columns * rows, np.inf)  # [m] to the nearest goal, as far as known

@@ -23,11 +23,9 @@ from maneuver_automaton.search.arrays import CostTable, DistanceGrid, Task
 def table_value(
     table: CostTable, task: Task, aim: int, x: float, y: float, heading: float
 ) -> float:
-    """Cost to go to one aim from a table made without obstacles; 0 where it does not reach.
-
-    `table.value` (headings, rows, columns) is the cost from a pose seen from its goal; `table.free`
-    is the least of it over the headings of the goal.
-    """
+    """Cost to go to one aim from a table made without obstacles; 0 where it does not reach."""
+    # `table.value` (headings, rows, columns) is the cost from a pose seen from its goal;
+    # `table.free` is the least of it over the headings of the goal.
     aims = task.aims.poses
     g_x, g_y, g_heading = aims[aim, 0], aims[aim, 1], aims[aim, 2]
     values = table.value
@@ -71,11 +69,9 @@ def cost_to_go(
     pose: tuple[float, float, float, float],
     trim: int,
 ) -> float:
-    """Estimate of the cost from here to the other end; inf if the plane alone forbids it.
-
-    The path in the plane or the climb at the least price, or the table made without obstacles; and
-    the maneuvers to the class at the other end, as far as the path does not pay for them.
-    """
+    """Estimate of the cost from here to the other end; inf if the plane alone forbids it."""
+    # The path in the plane or the climb at the least price, or the table made without obstacles;
+    # and the maneuvers to the class at the other end, as far as the path does not pay for them.
     aims, known = task.aims.poses, task.estimates
     x, y, heading, z = pose
     length, rise = math.inf, math.inf
@@ -119,12 +115,10 @@ def fill_table(
     shape: tuple[int, int],
     mirrored: bool,
 ) -> NDArray[np.float32]:
-    """Cost (headings, rows, columns) from each cell to the goal in the middle; inf if not reached.
-
-    Dijkstra over cells that each hold the exact pose of the cheapest path found; `shape` is how
-    many headings there are, and cells from the middle to the rim. Where the library
-    is its own mirror image, only poses on the left are looked at, and written twice.
-    """
+    """Cost (headings, rows, columns) from each cell to the goal in the middle; inf for none."""
+    # Dijkstra over cells that each hold the exact pose of the cheapest path found; `shape`:
+    # headings, and cells from the middle to the rim. Where the library is its own mirror image,
+    # only poses on the left are looked at, and written twice.
     n_headings, half = shape
     size = 2 * half + 1
     n = n_headings * size * size

@@ -125,11 +125,9 @@ def refine(library: TimesProblem, word: IntArray, times: Array, n: int, cost: fl
 def lengthen(
     library: TimesProblem, word: IntArray, times: Array, n: int, grown: int, share: float
 ) -> float:
-    """Give the trim at position `grown` some time and let the others make room, in place.
-
-    The first-order change of the times that keeps the end where it is, `share` of the way to the
-    first time that vanishes, then Newton back to the goal. Returns the largest violation.
-    """
+    """Give the trim at position `grown` time, the others making room; the violation left."""
+    # The first-order change of the times that keeps the end where it is, `share` of the way to the
+    # first time that vanishes, then Newton back to the goal.
     m = library.targets.size
     some = columns_of(library, word, n)
     columns = np.empty((n, 3))
@@ -184,10 +182,8 @@ def replace_runs(
     cost: float,
     most: int,
 ) -> tuple[int, float]:
-    """Replace two trims that alternate by the one between them, if cheaper; (length, cost).
-
-    Tried are the trims whose reduced cost in the middle of the run is nearest to zero.
-    """
+    """Replace two trims that alternate by the one between them, if cheaper; (length, cost)."""
+    # Tried are the trims whose reduced cost in the middle of the run is nearest to zero.
     trial = np.empty(word.size, dtype=np.int64)
     trial_times = np.empty(word.size)
     tried = np.empty(n_priced, dtype=np.bool_)
@@ -260,11 +256,9 @@ def replace_runs(
 def shorten_runs(
     library: TimesProblem, free_tail: int, word: IntArray, times: Array, n: int, cost: float
 ) -> tuple[int, float]:
-    """Shorten runs of two trims that alternate to a b a or a b a b, at next to no cost.
-
-    Where the trim between the two is missing, ever more switches gain ever less: the infimum is
-    no plan. Returns (length, cost).
-    """
+    """Shorten runs of two trims to a b a or a b a b, at next to no cost; (length, cost)."""
+    # Where the trim between the two is missing, ever more switches gain ever less: the infimum is
+    # no plan.
     trial = np.empty(word.size, dtype=np.int64)
     trial_times = np.empty(word.size)
     after = 0

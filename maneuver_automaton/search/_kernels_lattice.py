@@ -29,11 +29,7 @@ from maneuver_automaton.search._kernels_coast import (
     swept_end,
     too_short,
 )
-from maneuver_automaton.search._kernels_connection import (
-    edge_inside,
-    edge_proven,
-    free_candidate,
-)
+from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven, free_candidate
 from maneuver_automaton.search._kernels_distance import push
 from maneuver_automaton.search._kernels_estimate import cost_to_go
 from maneuver_automaton.search._kernels_nodes import (
@@ -74,13 +70,7 @@ from maneuver_automaton.search._kernels_nodes import (
     slot_of,
 )
 from maneuver_automaton.search._kernels_place import coast_place, edge_place, places_cost
-from maneuver_automaton.search.arrays import (
-    Joint,
-    LatticeArrays,
-    LatticeSearch,
-    SearchArrays,
-    Task,
-)
+from maneuver_automaton.search.arrays import Joint, LatticeArrays, LatticeSearch, SearchArrays, Task
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import class_of, price_of_switch
 
@@ -93,11 +83,8 @@ def expand(search: LatticeSearch, n: int, upper_bound: float) -> int:
 
 @bare_shared_kernel
 def expanded(search: LatticeSearch, n: int, upper_bound: float) -> int:
-    """Expand up to `n` nodes, the roots first; stops at the first connection if the task says so.
-
-    Children that cannot lead to less than `upper_bound` are left out. Returns whether it may go on:
-    1, or 0 when nothing is left to expand.
-    """
+    """Expand `n` nodes, roots first, or to the first connection; 1 if it may go on, or 0."""
+    # Children that cannot lead to less than `upper_bound` are left out.
     arrays, task, connecting = search.arrays, search.task, search.task.connecting
     grid, table, plane = search.grid, search.table, search.scene.layers.plane
     nodes, links, state = arrays.nodes, arrays.links, arrays.state
@@ -134,9 +121,7 @@ def expanded(search: LatticeSearch, n: int, upper_bound: float) -> int:
 
 
 @bare_inner_kernel
-def _push_roots(
-    search: LatticeSearch,
-) -> None:
+def _push_roots(search: LatticeSearch) -> None:
     """Push the roots of a search."""
     task, lib = search.task, search.library
     arrays, roots = search.arrays, search.task.roots
@@ -160,13 +145,11 @@ def _push_roots(
 
 @bare_inner_kernel
 def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
-    """Children of a node by coasts of the trims of its class, shorter ones first.
-
-    Tests come in the order of their price: limits and bound, duplicates in the cell, the estimate,
-    the clearance known from before, and only then the proof that the motion is free. A truncated
-    edge keeps what was driven before a contact: it ends in a finer cell of its own, so duplicates
-    and estimate are asked for again, and rule out nothing before.
-    """
+    """Children of a node by coasts of the trims of its class, shorter ones first."""
+    # Tests come in the order of their price: limits and bound, duplicates in the cell, the
+    # estimate, the clearance known from before, and only then the proof that the motion is free. A
+    # truncated edge keeps what was driven before a contact: it ends in a finer cell of its own, so
+    # duplicates and estimate are asked for again, and rule out nothing before.
     task, lib = search.task, search.library
     scene, arrays = search.scene, search.arrays
     nodes, links = arrays.nodes, arrays.links
@@ -278,11 +261,9 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
 
 @bare_inner_kernel
 def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> None:
-    """Children of a node by the maneuvers that lead out of its class.
-
-    Coasts begin at the child, so a maneuver is an edge with a coast of no time. The order of the
-    tests is that of `relax_coasts`; a maneuver is not truncated, since within it no trim is driven.
-    """
+    """Children of a node by the maneuvers that lead out of its class."""
+    # Coasts begin at the child, so a maneuver is an edge with a coast of no time, never truncated,
+    # since within it no trim is driven. The order of the tests is that of `relax_coasts`.
     task, lib = search.task, search.library
     scene, arrays = search.scene, search.arrays
     nodes, links = arrays.nodes, arrays.links
@@ -335,11 +316,9 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
 
 @bare_inner_kernel
 def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate: float) -> None:
-    """Analytic expansion: reach the other end by a word; keeps the cheapest plan found.
-
-    Only words that cost not much more than the estimate are tried. From a root all words of the
-    library are, from other nodes those of its few trims.
-    """
+    """Analytic expansion: reach the other end by a word; keeps the cheapest plan found."""
+    # Only words that cost not much more than the estimate are tried: from a root all words of the
+    # library, from other nodes those of its few trims.
     task, lib = search.task, search.library
     scene, arrays = search.scene, search.arrays
     nodes, links = arrays.nodes, arrays.links
@@ -400,11 +379,9 @@ def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate:
 def word_admitted(
     arrays: SearchArrays, task: Task, lib: LatticeArrays, words: IntArray, node: int, k: int
 ) -> bool:
-    """Whether the word through a node and one candidate keeps the limits of single words.
-
-    They are the number of trims, the least time of a trim that moves, and the longest of any. The
-    candidate is read away from the node, whose own trim may go on.
-    """
+    """Whether the word through a node and one candidate keeps the limits of single words."""
+    # They are the number of trims, the least time of a trim that moves, and the longest of any. The
+    # candidate is read away from the node, whose own trim may go on.
     scratch, links, nodes = arrays.scratch, arrays.links, arrays.nodes
     limits = task.limits
     row = scratch.rows[k]

@@ -63,10 +63,8 @@ PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
 
 @bare_inner_kernel
 def cells_along(cell: float, far: float, others: int) -> int:
-    """Number of cells along a side of a window [m] that have numbers of their own, a power of two.
-
-    `others` is the product of what headings, levels, ticks and layers need.
-    """
+    """Number of cells with numbers of their own along a side of a window [m], a power of two."""
+    # `others` is the product of what headings, levels, ticks and layers need.
     sides = 2
     # A quotient, which is exact, in place of a product, which might need more than 64 bits.
     while (
@@ -80,11 +78,9 @@ def cells_along(cell: float, far: float, others: int) -> int:
 def cell_key(
     cells: CellSizes, pose: tuple[float, float, float, float], layer: int, time: float, fine: int
 ) -> int:
-    """Number of the lattice cell a pose is in, seen from the frame of the cells.
-
-    `cells.radix` is the number of cells along a side of the window, a power of two, of headings,
-    levels of altitude and ticks of the clock; the last two are 1 where they make no difference.
-    """
+    """Number of the lattice cell a pose is in, seen from the frame of the cells."""
+    # `cells.radix`: cells along a side of the window, a power of two, headings, levels of altitude
+    # and ticks of the clock; the last two are 1 where they make no difference.
     # The grid is fixed to the first goal, so a moved problem has the moved cells.
     x, y, heading, z = pose
     to_x, to_y, to_heading, c, s = cells.frame
@@ -107,10 +103,8 @@ def cell_key(
 
 @bare_inner_kernel
 def layer_of(cells: CellSizes, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
-    """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
-
-    Nodes of one pose in different layers do not replace each other.
-    """
+    """Number of a node's layer: its class, and gear, trim and count if prices or limits need it."""
+    # Nodes of one pose in different layers do not replace each other.
     layer = class_of(lib.library, trim)
     if cells.by_gear:
         layer = layer * 3 + gear + 1
@@ -123,10 +117,8 @@ def layer_of(cells: CellSizes, lib: LatticeArrays, trim: int, gear: int, n_trims
 
 @bare_inner_kernel
 def first_slot(key: int, mask: int) -> int:
-    """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
-
-    Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
-    """
+    """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin."""
+    # Fibonacci hashing; Knuth (1998), *The art of computer programming 3*, Sec. 6.4.
     # Neighbours along a row of cells stay side by side: one line of the processor's cache holds
     # four rows of the table, and to wait for memory is most of what a look-up costs.
     block = key >> SIDE_BY_SIDE
@@ -139,10 +131,8 @@ def first_slot(key: int, mask: int) -> int:
 
 @bare_inner_kernel
 def slot_of(table: IntArray, generation: int, key: int) -> int:
-    """Row of a key in the hash table, or the free one where it belongs.
-
-    Rows are (key, generation and node); those of another generation are free.
-    """
+    """Row of a key in the hash table, or the free one where it belongs."""
+    # Rows are (key, generation and node); those of another generation are free.
     # Linear probing: nothing is ever deleted within a search, so the first free row ends it.
     mask = table.shape[0] - 1
     slot = first_slot(key, mask)
@@ -167,10 +157,8 @@ def add_node(
     link: tuple[int, ...],
     order: float,
 ) -> None:
-    """Append a node, make it the one of its cell, and push it, the lesser the `order` the sooner.
-
-    `row` are its columns of `nodes`, `link` those of `links` but the last.
-    """
+    """Append a node, make it the one of its cell, push it, the lesser the `order` the sooner."""
+    # `row` are its columns of `nodes`, `link` those of `links` but the last.
     nodes, links, state = arrays.nodes, arrays.links, arrays.state
     node = state[N_NODES]
     for k in range(9):

@@ -16,12 +16,7 @@ from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.collision.arrays import Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_coast import (
-    coasted,
-    edge_end,
-    is_one_in_plane,
-    part_body,
-)
+from maneuver_automaton.search._kernels_coast import coasted, edge_end, is_one_in_plane, part_body
 from maneuver_automaton.search.arrays import LatticeArrays, PlaceArrays, Scene
 
 GAUSS = 0.5 / math.sqrt(3.0)  # of a step: both points of the rule from its middle
@@ -38,10 +33,8 @@ def places_cost(scene: Scene) -> bool:
 def distance_within(
     world: WorldArrays, body: Body, x: float, y: float, heading: float, within: float
 ) -> float:
-    """Distance [m] of a body to what stands around it, exact below `within`, and no more than it.
-
-    The world has to know all that is nearer than `within`, as one does that keeps that distance.
-    """
+    """Distance [m] of a body to what stands around it, exact below `within`, at most that."""
+    # The world has to know all that is nearer than `within`, as one does that keeps that distance.
     place = Place(x, y, math.cos(heading), math.sin(heading))
     if field_bound(world.field, body, place) >= within:
         return within

@@ -147,12 +147,10 @@ def polish(
     isolated: int,
     max_trims: int,
 ) -> None:
-    """Refine times to machine precision, check that they are locally optimal, and record them.
-
-    Without linear conditions, a start with at most one time free lies next to its solution, and
-    Newton changes its cost by next to nothing. A start much costlier than all words asked for
-    need not be refined: most of the time would go there.
-    """
+    """Refine times to machine precision, check that they are locally optimal, and record them."""
+    # Without linear conditions, a start with at most one time free lies next to its solution, and
+    # Newton changes its cost by next to nothing. A start much costlier than all words asked for
+    # need not be refined: most of the time would go there.
     m = problem.library.targets.size
     if n <= 4 and m == 0:
         costliest = found.best[found.best.size - 1]
@@ -178,11 +176,9 @@ def polish(
 
 @inner_kernel
 def is_neighbour(problem: TimesProblem, n: int, times: Array) -> bool:
-    """Whether a solution is one with a trim less, which rounding gives a moment.
-
-    Where the conditions are tangent, times wrong by the root of the rounding error meet them to
-    the last bit. The word without its shortest trim then meets them as well.
-    """
+    """Whether a solution is one with a trim less, which rounding gives a moment."""
+    # Where the conditions are tangent, times wrong by the root of the rounding error meet them to
+    # the last bit. The word without its shortest trim then meets them as well.
     total = 0.0
     k = 0
     for i in range(n):

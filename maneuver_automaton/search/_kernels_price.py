@@ -64,13 +64,10 @@ def least_on_arc(
     angle: float,
     bounds: Array,
 ) -> float:
-    """Fill `bounds` with lower bounds of the price of every trim along an arc of `angle`.
-
-    Returns the least price at either end, which the best price does not exceed. Inside the arc a
-    price, a sine, has its least only where it falls at the begin and rises at the end, or where the
-    arc is longer than half a turn. `SLACK` is for rounding, which decides differently where the
-    least lies next to an end.
-    """
+    """Fill `bounds` with lower bounds of all prices along an arc of `angle`; least at an end."""
+    # The best price does not exceed what is returned. Inside the arc a price, a sine, has its least
+    # only where it falls at the begin and rises at the end, or where the arc is longer than half a
+    # turn. `SLACK` is for rounding, which decides differently where the least lies next to an end.
     cos_end, sin_end = math.cos(angle), math.sin(angle)
     sign = 1.0 if angle > 0.0 else -1.0
     long = abs(angle) > 3.0
@@ -102,12 +99,10 @@ def least_on_arc(
 def price_positions(
     library: TimesProblem, n_priced: int, word: IntArray, times: Array, n: int, p: Array
 ) -> tuple[int, Array, IntArray, Array]:
-    """Smallest reduced cost of all trims within each of the first `n` trims of a word.
-
-    Returns the position of the least, and for each position the reduced cost, its trim and the time
-    within the trim that it interrupts. A turn on the spot that follows does not move the end's
-    position. `n_priced` are the first trims of the library, those that can be inserted.
-    """
+    """Smallest reduced cost of all trims within each of the first `n` trims of a word."""
+    # Returns the position of the least, and for each position the reduced cost, its trim and the
+    # time within the trim that it interrupts. A turn on the spot that follows does not move the
+    # end's position. `n_priced` are the first trims of the library, those that can be inserted.
     twists = library.twists
     values = np.empty(max(n, 1))
     trims = np.empty(max(n, 1), dtype=np.int64)

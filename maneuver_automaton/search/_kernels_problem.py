@@ -234,10 +234,8 @@ def room_for(problem: WordProblem, n: int) -> WordProblem:
 def look_ahead(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int
 ) -> None:
-    """Fill in the distance, turn and conditions that a word's transitions leave to its trims.
-
-    That takes no pose, and most words are too costly already then.
-    """
+    """Fill in the distance, turn and conditions that a word's transitions leave to its trims."""
+    # That takes no pose, and most words are too costly already then.
     for k in range(seen.fixed.size):
         seen.fixed[k] = problem.fixed[k]
     for r in range(problem.library.targets.size):
@@ -262,10 +260,8 @@ def look_ahead(
 
 @bare_inner_kernel
 def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: int) -> int:
-    """Class of trims that the transition before position `i` leads to; -1 for no transition.
-
-    The turn of a free heading comes after the last transition, and has none after it.
-    """
+    """Class of trims that the transition before position `i` leads to; -1 for no transition."""
+    # The turn of a free heading comes after the last transition, and has none after it.
     if i < n and word[i] != problem.tail:
         return links.class_of[word[i]]
     if i == n and word[n - 1] == problem.tail:

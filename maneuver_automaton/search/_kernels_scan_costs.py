@@ -50,13 +50,11 @@ def any_node_may_do(
     room: tuple[Array, Array, Array],
     upper_bound: float,
 ) -> bool:
-    """Whether a word with one free time may have a solution, as far as its nodes show.
-
-    At one of them it costs little more than the upper bound and, where a time is to be met, at one
-    of them, maybe another, the last condition comes near to its target. That is no proof, but takes
-    a tenth of the time that the reduced gradients and the bisection take. To climb is no reason:
-    of words that climb too many were left out, and plans came out 3 % costlier.
-    """
+    """Whether a word with one free time may have a solution, as far as its nodes show."""
+    # At one of them it costs little more than the upper bound and, where a time is to be met, at
+    # one the last condition comes near to its target. No proof, but a tenth of the time that the
+    # reduced gradients and the bisection take. To climb is no reason: of words that climb too many
+    # were left out, and plans came out 3 % costlier.
     times, out, _ = room
     q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for
     reach = affordable(problem, word, n, word[q], upper_bound)
@@ -108,11 +106,8 @@ def nearly_cheap(problem: WordProblem, word: IntArray, n: int, upper_bound: floa
 
 @bare_inner_kernel
 def may_be_cheap(one: float, other: float, most: float) -> bool:
-    """Whether a branch that costs `one` and `other` at two nodes may cost less between them.
-
-    Less than `most`, if it falls no more than it does from one to the other. NaN where it is not at
-    a node.
-    """
+    """Whether a branch that costs `one` and `other` at two nodes may cost below `most` between."""
+    # It may fall as much as it does from one to the other. NaN where it is not at a node.
     change = abs(other - one)
     if math.isnan(change):
         return one < most or other < most
@@ -123,10 +118,8 @@ def may_be_cheap(one: float, other: float, most: float) -> bool:
 def coasting_cost(
     problem: WordProblem, word: IntArray, triple: IntArray, free: int, time: float, solved: Array
 ) -> float:
-    """What the trims of a word cost: one for a given time, three for the times of a branch.
-
-    A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
-    """
+    """What the trims of a word cost: one for a given time, three for the times of a branch."""
+    # A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
     cost = problem.library.rates[word[free]] * time
     for s in range(3):
         cost += problem.library.rates[word[triple[s]]] * abs(solved[s])
@@ -147,11 +140,9 @@ def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int)
 
 @bare_inner_kernel
 def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) -> float:
-    """Lower bound of what coasting costs in a word whose first trim lasts `time`.
-
-    From where it ends, and the transition before it began, the rest of the word has to lead to the
-    goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
-    """
+    """Lower bound of what coasting costs in a word whose first trim lasts `time`."""
+    # From where it ends, and the transition before it began, the rest of the word has to lead to
+    # the goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
     v, u, w = (
         problem.library.twists[trim, 0],
         problem.library.twists[trim, 1],
@@ -170,10 +161,8 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
 def is_met_nearby(
     problem: WordProblem, word: IntArray, triple: IntArray, lack: float, before: float
 ) -> bool:
-    """Whether what a condition lacks at a node is next to nothing, or whole turns can make it up.
-
-    Somewhere it lacks nothing if that changes its sign since the node `before`: NaN for none.
-    """
+    """Whether what a condition lacks at a node is next to nothing, or whole turns make it up."""
+    # Somewhere it lacks nothing if that changes its sign since the node `before`: NaN for none.
     target = problem.library.targets[problem.library.targets.size - 1]
     if abs(lack) <= problem.scan.slack * abs(target) or lack * before <= 0.0:
         return True

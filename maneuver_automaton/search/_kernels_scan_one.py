@@ -183,10 +183,7 @@ def bisect(
     known: ClosedForm,
     cheap: float,
 ) -> None:
-    """Halve the interval on the stack where its bend leaves room for a root; propose the roots.
-
-    Intervals in which the trims of the word cost more than `cheap` are dropped.
-    """
+    """Halve the interval on the stack if below `cheap` and bent enough for roots; propose these."""
     lows, highs, numbers = stack
     word, n, triple, q = four.word, four.n, four.triple, four.q
     m = problem.library.targets.size

@@ -86,11 +86,9 @@ def place_of(search: GraphArrays, column: int, row: int) -> int:
 
 @bare_inner_kernel
 def least_to_go(aims: Aims, cell: float, column: int, row: int, state: int) -> float:
-    """Lower bound of the cost from a node to the nearest aim.
-
-    By each slope an edge costs the price of its displacement and what is left, whose least sum from
-    state to state is the offset. So no edge lowers the bound by more than it costs.
-    """
+    """Lower bound of the cost from a node to the nearest aim."""
+    # By each slope an edge costs the price of its displacement and what is left, whose least sum
+    # from state to state is the offset. So no edge lowers the bound by more than it costs.
     x, y, least = column * cell, row * cell, math.inf
     slope, offset = aims.slope, aims.offset
     for g in range(aims.place.shape[0]):
@@ -107,10 +105,8 @@ def least_to_go(aims: Aims, cell: float, column: int, row: int, state: int) -> f
 
 @bare_kernel
 def lower_offsets(lattice: StateLattice, slope: Array, offset: Array, steady: IntArray) -> None:
-    """Lower offsets (S, K) until no edge leads to a lower one, by the Bellman-Ford algorithm.
-
-    `steady` (K,) becomes 1, or 0 for a slope by which a cycle of edges costs less than nothing.
-    """
+    """Lower offsets (S, K) until no edge leads to a lower one, by the Bellman-Ford algorithm."""
+    # `steady` (K,) becomes 1, or 0 for a slope by which a cycle of edges costs less than nothing.
     n, cell = offset.shape[0], lattice.cell
     for k in range(slope.shape[1]):
         steady[k] = 0
@@ -171,13 +167,11 @@ def met_along(
     near: float,
     travel: float,
 ) -> int:
-    """What an edge meets: FREE, BLOCKED, or the RIM of the window.
-
-    All of it is at least `near` from any static obstacle, and its path no longer than `travel`. A
-    few pieces of its course prove most other edges. Where they do not, all of them are looked at,
-    each followed exactly and to within a margin that is next to nothing: what is not proven then is
-    met.
-    """
+    """What an edge meets: FREE, BLOCKED, or the RIM of the window."""
+    # All of it is at least `near` from any static obstacle, and its path no longer than `travel`. A
+    # few pieces of its course prove most other edges. Where they do not, all are looked at, each
+    # followed exactly and to within a margin that is next to nothing: what is not proven then is
+    # met.
     # A call hands over every field of a scene, which takes longer than these tests: they are
     # merged into the loop, and leave most edges to no call at all.
     scene = coarse.scene
@@ -223,11 +217,9 @@ def end_of(
 
 @bare_kernel
 def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
-    """Take up to `n` motions in the order of their cost and the weighted bound of the cost to go.
-
-    Returns whether it may go on: 1, or 0 once an aim is found or nothing is left that leads to a
-    plan cheaper than `upper_bound`.
-    """
+    """Take up to `n` motions in the order of their cost and weighted bound of the cost to go."""
+    # Returns 1 if it may go on, 0 once an aim is found or nothing is left that leads to a plan
+    # cheaper than `upper_bound`.
     search, lattice = query.arrays, query.lattice
     aims, coarse, fine, weight = query.aims, query.coarse, query.fine, query.weight
     links, state, cell = search.links, search.state, lattice.cell
@@ -327,16 +319,10 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
 
 @bare_inner_kernel
 def push_others(
-    search: GraphArrays,
-    lattice: StateLattice,
-    item: int,
-    node: tuple[int, int, int],
-    ahead: float,
+    search: GraphArrays, lattice: StateLattice, item: int, node: tuple[int, int, int], ahead: float
 ) -> None:
-    """List all motions from nodes that were expanded to `node`, but for one of them.
-
-    A node is its column, row and state; `ahead` is the weighted bound of the cost to go from it.
-    """
+    """List all motions from nodes that were expanded to `node`, but for one of them."""
+    # A node is its column, row and state; `ahead` is the weighted bound of the cost to go from it.
     column, row, at = node
     # Some of them are listed already. To test these once more costs little.
     for k in range(lattice.into_first[at], lattice.into_first[at + 1]):

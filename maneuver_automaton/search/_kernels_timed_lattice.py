@@ -62,10 +62,8 @@ def cost_in(known: KnownCosts, column: int, row: int, state: int) -> float:
 def useless_until(
     query: TimedQuery, node: tuple[int, int, int], arrival: float, paid: float
 ) -> float:
-    """Until when a label of a node may wait that makes one of such a cost useless; -1 if none does.
-
-    Whatever arrives by then, and costs as much more as it is later, is useless too.
-    """
+    """Until when a label may wait that makes one of such a cost useless; -1 if none does."""
+    # Whatever arrives by then, and costs as much more as it is later, is useless too.
     search, quiet, ends = query.arrays, query.timing.quiet, query.timing.most_time < math.inf
     place, _, _ = place_in(search.table, node[0], node[1])
     if place < 0:
@@ -99,10 +97,8 @@ def is_free_at(query: TimedQuery, label: int, e: int, leave: float) -> bool:
 
 @bare_inner_kernel
 def list_motion(query: TimedQuery, label: int, e: int, ticks: int, upper_bound: float) -> None:
-    """Put a motion on the open list that begins so many ticks after a label, or one less.
-
-    Nothing where it cannot wait so long, comes too late, or leads to no plan below a cost.
-    """
+    """Put a motion on the open list that begins so many ticks after a label, or one less."""
+    # Nothing where it cannot wait so long, comes too late, or leads to no plan below a cost.
     search, lattice = query.arrays, query.lattice
     links, waited = search.links, query.timing.tick * (ticks - 1) if ticks > 0 else 0.0
     leave = search.times[label, ARRIVAL] + waited
@@ -181,11 +177,8 @@ def try_motion(query: TimedQuery, item: int, key: float, upper_bound: float) -> 
 
 @bare_kernel
 def expand_in_time(query: TimedQuery, n: int, upper_bound: float) -> int:
-    """Take up to `n` labels and motions from the open list, by their cost and the cost to go.
-
-    Returns whether it may go on: 1, or 0 once an aim is found or nothing is left that leads to a
-    plan cheaper than `upper_bound`.
-    """
+    """Take up to `n` labels and motions from the open list, by their cost and the cost to go."""
+    # Returns as `expand_lattice`.
     search, lattice = query.arrays, query.lattice
     links, state, times = search.links, search.state, search.times
     if state[BEGUN] == 0:

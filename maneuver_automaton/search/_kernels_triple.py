@@ -27,11 +27,9 @@ from maneuver_automaton.words._kernels_times import assign, end_and_columns
 
 @bare_inner_kernel
 def choose_triple(problem: WordProblem, word: IntArray, n: int, triple: IntArray) -> bool:
-    """Fill `triple` with the positions solved in closed form, the last ones that fit.
-
-    False if none fit: parallel neighbours cannot both be solved for, nor three straights. Two
-    straights have a pole where they are parallel, so one is solved for if possible.
-    """
+    """Fill `triple` with the positions solved in closed form, the last to fit; False if none."""
+    # Parallel neighbours cannot both be solved for, nor three straights. Two straights have a pole
+    # where they are parallel, so one is solved for if possible.
     for straights in range(1, 3):
         for k in range(n - 1, 1, -1):
             for j in range(k - 1, 0, -1):
@@ -70,13 +68,10 @@ def solve_triple(
     times: Array,
     out: Array,
 ) -> None:
-    """Both branches (2, 3) of the times at `triple`, the other `times` being given.
-
-    It takes what it needs, twists, goal, tolerance and the counter of its calls, and not the
-    problem: a call hands over every field of every structure, and this is called at every node. A
-    function for that would not do: it counts no references, so it may not return an array to one
-    that does.
-    """
+    """Both branches (2, 3) of the times at `triple`, the other `times` being given."""
+    # It takes twists, goal, tolerance and the counter of its calls, and not the problem: a call
+    # hands over every field of every structure, at every node. A function for that would not do: it
+    # counts no references, so it may not return an array to one that does.
     twists, goal, tolerance, counter = steering
     counter[2] += 1
     pose = (0j, 0.0)
@@ -96,12 +91,7 @@ def solve_triple(
             stage += 1
         else:
             t = word[i]
-            pose = moved(
-                pose,
-                complex(twists[t, 0], twists[t, 1]),
-                twists[t, 2],
-                times[i],
-            )
+            pose = moved(pose, complex(twists[t, 0], twists[t, 1]), twists[t, 2], times[i])
     # goal seen from the end of the lead, before the tail
     z = complex(goal[0], goal[1])
     heading = goal[2] - pose[1]
@@ -181,10 +171,8 @@ def reduced_gradient(problem: WordProblem, four: FreeTime, times: Array) -> floa
 
 @bare_inner_kernel
 def take_branch(problem: WordProblem, four: FreeTime, branch: int, times: Array) -> float:
-    """Fill `times` from a branch that is solved; the reduced gradient there, NaN if it is empty.
-
-    With linear conditions these must vanish, and not the gradient: it is 0.
-    """
+    """Fill `times` from a branch that is solved; the reduced gradient there, NaN if it is empty."""
+    # With linear conditions these must vanish, and not the gradient: it is 0.
     if math.isnan(four.both[branch, 0]):
         return math.nan
     for s in range(3):
@@ -228,10 +216,8 @@ def levels(
     high: Array,
     span: Array,
 ) -> None:
-    """Propose `start` for all whole turns with which the linear conditions can be met.
-
-    `low` and `high` bound the times in a cell, unwrapped; `span` (m, 2) the conditions' values.
-    """
+    """Propose `start` for all whole turns with which the linear conditions can be met."""
+    # `low` and `high` bound the times in a cell, unwrapped; `span` (m, 2) the conditions' values.
     m = problem.library.targets.size
     shifts, first, last = candidates.turns[0], candidates.turns[1], candidates.turns[2]
     times = candidates.work

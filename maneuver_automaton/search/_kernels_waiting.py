@@ -88,10 +88,8 @@ def earliest_arrival(search: PathSearch) -> int:
 
 @bare_inner_kernel
 def _reach(search: PathSearch, joint: int, arrival: float, parent: int, left: float) -> float:
-    """Note that a joint is reached, unless it was before, in the same stretch of time.
-
-    Returns until when the vehicle may stand there; -1 where there is no room for more states.
-    """
+    """Note a joint that is reached, if new in this stretch of time; until when it may stand."""
+    # -1: there is no room for more states.
     path, quiet = search.path, search.quiet
     latest = path.latest[joint]
     while latest >= 0:

@@ -82,11 +82,9 @@ def closed_form_words(
 
 @inner_kernel
 def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, n: int) -> None:
-    """Words that cannot reach every pose: one or two subgroups, or straights only.
-
-    The goal must lie where they can go. What each subgroup contributes follows in closed form;
-    the times are then the solution of a square linear system.
-    """
+    """Words that cannot reach every pose: one or two subgroups, or straights only."""
+    # The goal must lie where they can go. What each subgroup contributes follows in closed form;
+    # the times are then the solution of a square linear system.
     m = problem.library.targets.size
     straight = True
     # Positions of the first trim of either subgroup; n: no trim is of it. One that only climbs or
@@ -201,10 +199,8 @@ def passing_words(
     room: tuple[Array, Array, Array],
     upper_bound: float,
 ) -> None:
-    """Words of four trims that pass through one of them: the other three follow in closed form.
-
-    Its transitions alone turn and move a vehicle on, which may be all that is wanted of a trim.
-    """
+    """Words of four trims that pass through one of them: the other three follow in closed form."""
+    # Its transitions alone turn and move a vehicle on, which may be all that is wanted of a trim.
     kept, triple = less[0], less[1]  # rows that last a while, and those solved for
     for passed in range(n):
         if word[passed] == tail:
@@ -237,11 +233,10 @@ def first_of_class(links: Links, wanted: int) -> int:
 def promising(
     problem: WordProblem, left: WordProblem, word: IntArray, n: int, upper_bound: float
 ) -> bool:
-    """Whether a word can be cheaper than the costliest of the solutions asked for.
-
-    Lower bounds that hold for any times, of what its transitions have `left` to its trims: distance
-    and turn at the best price per metre and radian, each linear condition at the best per unit.
-    """
+    """Whether a word can be cheaper than the costliest of the solutions asked for."""
+    # Lower bounds that hold for any times, of what its transitions have `left` to its trims:
+    # distance and turn at the best price per metre and radian, each linear condition at the best
+    # per unit.
     if upper_bound == np.inf:
         return True
     per_metre, per_radian, per_second = np.inf, np.inf, np.inf
@@ -282,11 +277,9 @@ def propose_words(
     numbers: tuple[int, int, int],
     upper_bound: float,
 ) -> int:
-    """Propose starts for words of n trims, at most one time free, of `numbers` (n, first, last).
-
-    Those that cannot span the plane if `flat`, otherwise those that can. Returns the number of the
-    word to go on with: before the last when the buffer is full.
-    """
+    """Propose starts for words of n trims, at most one time free, of `numbers` (n, first, last)."""
+    # Those that cannot span the plane if `flat`, otherwise those that can. Returns the number of
+    # the word to go on with: before the last when the buffer is full.
     n, first, last = numbers
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
@@ -342,11 +335,9 @@ def scan_words(
 
 @bare_inner_kernel
 def word_of_number(n_trims: int, word: IntArray, n: int, number: int, tail: int) -> None:
-    """Fill `word` with the digits of its number, and with the turn of a free heading.
-
-    It takes few arguments, as does the price of the transitions: for most words with transitions
-    that is all there is to do, and arguments cost more than that.
-    """
+    """Fill `word` with the digits of its number, and with the turn of a free heading."""
+    # It takes few arguments, as does the price of the transitions: for most words with transitions
+    # that is all there is to do, and arguments cost more than that.
     if tail >= 0:
         n_trims -= 1
         n -= 1
@@ -365,11 +356,9 @@ def prepare_word(
     triple: IntArray,
     upper_bound: float,
 ) -> int:
-    """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
-
-    The word is one that is seen: whether its trims span, and what its transitions leave of the
-    distance, shows only there. The lower bound of its cost comes before all that is costly.
-    """
+    """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can."""
+    # Whether the trims of a word span, and what its transitions leave of the distance, shows only
+    # in one that is seen. The lower bound of its cost comes before all that is costly.
     blocks = word_blocks(problem, word, n)
     if blocks == 0 or not time_left(problem) > 0.0:
         return 0
@@ -383,10 +372,8 @@ def prepare_word(
 
 @bare_inner_kernel
 def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
-    """Number of runs of parallel trims; negative where the word cannot span, 0 where it is useless.
-
-    Without linear conditions two parallel neighbours are never better than one of them.
-    """
+    """Number of runs of parallel trims; negative where the word cannot span, 0 if useless."""
+    # Without linear conditions two parallel neighbours are never better than one of them.
     blocks = 0
     straights = 0
     last = -1  # the last trim that moves in the plane
@@ -424,10 +411,7 @@ def scan_mode(
     tie: float,
     not_first: int,
 ) -> None:
-    """Scan all words of `n` trims, and of a free turn where `tail` is 1; polish what comes up.
-
-    But for those that begin with the trim `not_first`.
-    """
+    """Scan words of `n` trims, with a free turn if `tail`, not from `not_first`; polish them."""
     last = (problem.library.twists.shape[0] - tail) ** n
     each = (problem.library.twists.shape[0] - tail) ** (
         n - 1

@@ -266,13 +266,7 @@ def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
         return word
     trims, times = _with_room(word)
     size, cost, least = _kernels_insertion.word_with_short_runs(
-        library.problem,
-        library.n_priced,
-        library.tail,
-        trims,
-        times,
-        len(word.trims),
-        word.cost,
+        library.problem, library.n_priced, library.tail, trims, times, len(word.trims), word.cost
     )
     return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 

@@ -395,9 +395,5 @@ def _reversed(maneuver: Maneuver) -> Maneuver:
             control=np.concatenate([course.control[-2::-1], course.control[:1]]),
         )
     return replace(
-        maneuver,
-        source=maneuver.target,
-        target=maneuver.source,
-        displacement=back,
-        course=course,
+        maneuver, source=maneuver.target, target=maneuver.source, displacement=back, course=course
     )

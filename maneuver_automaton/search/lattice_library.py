@@ -313,12 +313,7 @@ def edges_of(library: Library) -> EdgeArrays:
 
 
 def motion_along(
-    library: Library,
-    parts: Sequence[Part],
-    edges: EdgeArrays,
-    *,
-    timed: bool,
-    close: float = CLOSE,
+    library: Library, parts: Sequence[Part], edges: EdgeArrays, *, timed: bool, close: float = CLOSE
 ) -> tuple[PieceArrays, IntArray]:
     """Pieces of every part, then of the pose alone, along every edge; samples of the parts.
 

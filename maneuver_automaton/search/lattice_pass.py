@@ -337,9 +337,5 @@ def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     table = np.zeros((4 * n, 2), dtype=np.int64)
     layout.rehash(search.table, int(search.state[layout.GENERATION]), table)
     return search._replace(
-        nodes=wide_nodes,
-        links=wide_links,
-        table=table,
-        heap_key=heap_key,
-        heap_node=heap_node,
+        nodes=wide_nodes, links=wide_links, table=table, heap_key=heap_key, heap_node=heap_node
     )

@@ -24,13 +24,7 @@ from maneuver_automaton.search.arrays import DistanceGrid, LeastPrices, Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 from maneuver_automaton.search.place_arrays import least_prices
-from maneuver_automaton.search.scene import (
-    Worlds,
-    ends_of,
-    scene_of,
-    window_of,
-    worlds_around,
-)
+from maneuver_automaton.search.scene import Worlds, ends_of, scene_of, window_of, worlds_around
 from maneuver_automaton.words.library import NO_TRIM, SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
 

@@ -279,10 +279,7 @@ AT_WILL = Schedule(
                 Resolution(scale=0.12, durations=0.17),
             ),
         ),
-        (
-            2**62,
-            (Resolution(scale=0.24, durations=0.25, truncated=True, margin=0.1, guided=True),),
-        ),
+        (2**62, (Resolution(scale=0.24, durations=0.25, truncated=True, margin=0.1, guided=True),)),
     ),
     first_chunk=64,
     most_chunk=8192,

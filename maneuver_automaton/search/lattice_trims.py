@@ -176,10 +176,8 @@ def is_mirrored(twists: Array, rates: Array) -> bool:
 
 
 def _words(moving: IntArray, twists: Array) -> IntArray:
-    """Words of three trims whose neighbours differ; of two where none turns, which are enough.
-
-    Two trims along one path are no neighbours: one of them does what both do.
-    """
+    """Words of three trims whose neighbours differ; of two where none turns, which are enough."""
+    # Two trims along one path are no neighbours: one of them does what both do.
     every = moving.tolist()
     if len(every) > 1 and not twists[:, 2].any():
         return np.array(

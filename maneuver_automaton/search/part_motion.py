@@ -46,9 +46,7 @@ class Pieces(NamedTuple):
 
 
 def parts_of(
-    automaton: Automaton,
-    footprint: Sequence[Shape],
-    carried: Sequence[Sequence[Shape]] = (),
+    automaton: Automaton, footprint: Sequence[Shape], carried: Sequence[Sequence[Shape]] = ()
 ) -> tuple[Part, ...]:
     """The vehicle's own body, and its other parts where its model says, each in its own frame."""
     model = automaton.model
@@ -179,10 +177,7 @@ def pieces_of(
         more = off[kept] if stepwise else _greatest(between, begin[kept], end[kept])
         errors.append(off[kept] + more)
         middle = (begin[split] + end[split]) // 2
-        begin, end = (
-            np.concatenate([begin[split], middle]),
-            np.concatenate([middle, end[split]]),
-        )
+        begin, end = (np.concatenate([begin[split], middle]), np.concatenate([middle, end[split]]))
     start, stop, error = (np.concatenate(parts) for parts in (begins, finals, errors))
     order = np.argsort(start, kind="stable")
     start, stop = start[order], stop[order]

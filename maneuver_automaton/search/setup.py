@@ -16,8 +16,9 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.groups.se2 import seen_from
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.words._kernels_closing import MET
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.closing import MET, EndConditions, closest_times
+from maneuver_automaton.words.closing import EndConditions, closest_times
 from maneuver_automaton.words.library import (
     FULL_TURN,
     MovingTrims,

@@ -26,13 +26,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
-from maneuver_automaton.search.arrays import (
-    Aims,
-    GraphArrays,
-    GraphQuery,
-    StateLattice,
-    Tested,
-)
+from maneuver_automaton.search.arrays import Aims, GraphArrays, GraphQuery, StateLattice, Tested
 from maneuver_automaton.search.lattice_goals import EXACT, at_headings, cells_within, facing
 from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of_trims
 from maneuver_automaton.search.lattice_pass import GROWN_S

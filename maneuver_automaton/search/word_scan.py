@@ -186,13 +186,7 @@ class WordScan:
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
 
     def _scan_all(
-        self,
-        flat: bool,
-        chunk: int,
-        mode: Mode,
-        n: int,
-        budget: Budget,
-        max_words: int | None,
+        self, flat: bool, chunk: int, mode: Mode, n: int, budget: Budget, max_words: int | None
     ) -> bool:
         """Scan all words of `n` trims that span the plane, or not; `chunk` at a time."""
         tail = 1 if self.setup.free_heading else 0

@@ -273,12 +273,7 @@ class WordSetup:
 
 
 def word_setup(
-    problem: Problem,
-    goal: Goal,
-    *,
-    most_trims: int,
-    also: Sequence[int] = (),
-    steers: bool = False,
+    problem: Problem, goal: Goal, *, most_trims: int, also: Sequence[int] = (), steers: bool = False
 ) -> WordSetup:
     """Library and alphabet from which every search over words with maneuvers starts.
 

@@ -125,12 +125,7 @@ def most_admitted(*, free_heading: bool, fixed: bool) -> int:
 
 
 def search_setup_words(
-    problem: Problem,
-    setup: SearchSetup,
-    *,
-    alternatives: int,
-    budget: Budget,
-    spare: bool,
+    problem: Problem, setup: SearchSetup, *, alternatives: int, budget: Budget, spare: bool
 ) -> list[Word]:
     """Cheapest words of as few trims as the conditions need, from the trims of `setup` alone.
 

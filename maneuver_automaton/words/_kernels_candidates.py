@@ -45,11 +45,9 @@ NEARLY = 1e-7  # [rad] and share by which a bound is taken lower than it is
 
 @inner_kernel
 def trim_and_gear(trim: int, gear: int) -> tuple[int, int]:
-    """The trim and gear at an end of a word, as whole numbers of one type.
-
-    Numbers that are known when a kernel is compiled have types of their own, and every mixture of
-    them would compile `candidates` once more.
-    """
+    """The trim and gear at an end of a word, as whole numbers of one type."""
+    # Numbers known when a kernel is compiled have types of their own: each mixture of them would
+    # compile `candidates` once more.
     return np.int64(trim), np.int64(gear)  # type: ignore[return-value]
 
 
@@ -67,17 +65,13 @@ def seen(
 def climb_time(
     lib: LibraryArrays,
     word: IntArray,
-    last: int,
     goal_trim: int,
     climb: int,
     start_trim: int,
     altitude: float,
     times: Array,
 ) -> float:
-    """Time of the vertical trim `climb` that ends at the altitude; 0 where the library has none.
-
-    `altitude` is that of the goal above the start; without a climb it has to fit already.
-    """
+    """Time of the trim `climb` that gains the altitude left; 0 for none, where it fits already."""
     left, before = altitude, start_trim
     for n in range(3):
         trim = word[n]
@@ -175,11 +169,9 @@ def solve_path(
     branches: Array,
     out: Array,
 ) -> None:
-    """Fill `out` (2, 3, 2) with the times of three trims, each of them driven the one way or other.
-
-    Nothing lies between them. `branches` (2, 3) is room for their `extents`. `bound` is what a word
-    has to undercut, and the `least_prices`: where none does, the first time is inf.
-    """
+    """Fill `out` (2, 3, 2) with times of three trims, each driven either way; inf if costly."""
+    # `branches` (2, 3) is room for their `extents`; `bound` what a word has to undercut, and the
+    # `least_prices`. Nothing lies between the trims.
     upper_bound, second, radian = bound
     motions = ahead(lib, word, 0), ahead(lib, word, 1), ahead(lib, word, 2)
     # Whatever word it is, its turns add up to the goal's heading, unless that is free.
@@ -226,8 +218,7 @@ def candidates(
 
     The first `n_words` rows of `words` are tried. `start` and `goal` are (x, y, heading, z);
     `before` and `after` are the (trim, gear) there, NO_TRIM and 0 where any will do. What costs
-    `upper_bound` or more is left out: first by what the transitions cost, then by the least cost of
-    the distance, and only then is a word steered.
+    `upper_bound` or more is left out.
     """
     x, y, heading, z = start
     g_x, g_y, g_heading, g_z = goal
@@ -293,9 +284,7 @@ def candidates(
                     continue
                 level = scratch.branches[0]
                 level[0], level[1], level[2] = 0.0, 0.0, 0.0
-                slope = climb_time(
-                    lib, words[row], last, goal_trim, climb, start_trim, g_z - z, level
-                )
+                slope = climb_time(lib, words[row], goal_trim, climb, start_trim, g_z - z, level)
                 if not lib.rounding.shortest <= slope <= lib.longest[climb]:
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
@@ -351,14 +340,8 @@ def candidates(
                         steps = (step_of(lib, a, b), step_of(lib, b, c))
                     steer(motions, steps, rel, limits, branches)
             elif n_trims == 2:
-                steer_two(
-                    motion_of(lib, a),
-                    step_of(lib, a, b),
-                    motion_of(lib, b),
-                    rel,
-                    lib.rounding.tolerance,
-                    branches[0],
-                )
+                pair, tolerance = (motion_of(lib, a), motion_of(lib, b)), lib.rounding.tolerance
+                steer_two(pair[0], step_of(lib, a, b), pair[1], rel, tolerance, branches[0])
             elif n_trims == 1:
                 steer_one(motion_of(lib, a), rel, branches[0])
             else:
@@ -379,10 +362,11 @@ def candidates(
                     if not least < upper_bound:
                         continue
                 cost, duration, usable, driven = fixed, 0.0, True, 0
+                lasted = scratch.times[count]
                 trim, gear = start_trim, start_gear
                 for n in range(n_trims):
                     t, this = branches[branch, n], words[row, n]
-                    scratch.times[count, n] = t
+                    lasted[n] = t
                     if t > 0.0:
                         driven += 1
                     if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
@@ -405,21 +389,12 @@ def candidates(
                 if not cost < upper_bound:
                     continue
                 for n in range(n_trims, 3):
-                    scratch.times[count, n] = 0.0
+                    lasted[n] = 0.0
                 t = slope
                 if slope > 0.0:
                     duration += slope
                 elif lib.tried.climbs.shape[0] > 0:
-                    t = climb_time(
-                        lib,
-                        words[row],
-                        last,
-                        goal_trim,
-                        climb,
-                        start_trim,
-                        g_z - z,
-                        scratch.times[count],
-                    )
+                    t = climb_time(lib, words[row], goal_trim, climb, start_trim, g_z - z, lasted)
                     if not t >= 0.0 or (climb >= 0 and t < lib.rounding.shortest):
                         continue
                     if climb >= 0:
@@ -427,9 +402,7 @@ def candidates(
                         duration += t
                 if driven < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
-                    missed = word_misses(
-                        lib, words[row], folded, facing, target, scratch.times[count]
-                    )
+                    missed = word_misses(lib, words[row], folded, facing, target, lasted)
                     if not missed <= lib.rounding.met * size:
                         continue
                 if not one_class:
@@ -448,7 +421,7 @@ def candidates(
                 scratch.durations[count] = duration
                 scratch.rows[count] = row
                 scratch.climbs[count] = climb
-                scratch.times[count, 3] = t
+                lasted[3] = t
                 count += 1
     return count
 
@@ -466,18 +439,11 @@ def candidate_batch(
 ) -> int:
     """Candidates of each of many pairs of poses (n, 4); how many the last pair has, for timing."""
     count = 0
+    before, after = trim_and_gear(start_trim, 0), trim_and_gear(goal_trim, 0)
     for k in range(starts.shape[0]):
         start = (starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3])
         goal = (goals[k, 0], goals[k, 1], goals[k, 2], goals[k, 3])
         count = candidates(
-            lib,
-            lib.tried.words,
-            n_words,
-            start,
-            trim_and_gear(start_trim, 0),
-            goal,
-            trim_and_gear(goal_trim, 0),
-            upper_bound,
-            scratch,
+            lib, lib.tried.words, n_words, start, before, goal, after, upper_bound, scratch
         )
     return count

@@ -14,6 +14,9 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import back_from, coast, compose, nearest_turn
 
+STEPS = 8
+MET = 1e-9  # [m, rad, s] below this a condition is met, and no step that misses more is followed
+EXACT = 1e-15  # nothing is left to be closed
 SWEEPS = 30  # of rotations at most; a handful does
 ORTHOGONAL = 1e-15  # cosine of the angle between two columns that are taken to be orthogonal
 
@@ -31,10 +34,8 @@ def missing(
     gap: Array,
     columns: Array,
 ) -> float:
-    """Fill `gap` (4 + m,) with what is missing, `columns` (n, 4 + m) with derivatives; the worst.
-
-    The first four conditions are those of the end, of the others ``rows @ times = targets``.
-    """
+    """Fill `gap` (4 + m,) with what is missing, `columns` (n, 4 + m) with slopes; the worst."""
+    # The first four conditions are those of the end, the others ``rows @ times = targets``.
     n = times.size
     x, y, turn, z = start[0], start[1], start[2], start[3]
     for i in range(n):
@@ -78,14 +79,10 @@ def missing(
 
 @inner_kernel
 def smallest_change(columns: Array, gap: Array, rank: float, change: Array) -> None:
-    """Fill `change` (n,) with the least solution of ``columns^T change = gap``; both are spoilt.
-
-    Singular values below `rank` times the greatest count as none. Columns (n, k) are turned in
-    pairs until they are orthogonal: then their lengths are the singular values, each to all its
-    digits, and the solution is a sum over them.
-
-    Source: one-sided Jacobi; Golub, Van Loan (2013), *Matrix Computations*, Sec. 8.6.3.
-    """
+    """Fill `change` (n,) with the least solution of ``columns^T change = gap``; both are spoilt."""
+    # Columns (n, k) are turned in pairs until they are orthogonal: then their lengths are the
+    # singular values, each to all its digits, and the solution is a sum over them, but for those
+    # below `rank` times the greatest. One-sided Jacobi; Golub, Van Loan (2013), Sec. 8.6.3.
     n, k = columns.shape
     for _ in range(SWEEPS):
         turned = False
@@ -140,32 +137,25 @@ def close_times(
     durations: Array,
     rank: float,
     at_least: float,
-    steps: int,
-    met: float,
-    exact: float,
 ) -> tuple[Array, float]:
-    """Times (n,) near `durations` (n,) that miss the least, and what the worst condition misses.
-
-    As `closing.closest_times`, whose arguments and limits they are.
-    """
+    """Times (n,) near `durations` (n,) that miss the least, as `closing.closest_times`."""
     n, k = durations.size, 4 + targets.size
     best, least = durations.copy(), np.inf
     now, change = durations.copy(), np.empty(n)
     columns, gap = np.empty((n, k)), np.empty(k)
-    lasts = np.empty(n, dtype=np.bool_)
-    any_lasts = False
+    lasts, any_lasts = np.empty(n, dtype=np.bool_), False
     for i in range(n):
         lasts[i] = durations[i] != 0.0 or at_least < 0.0
         any_lasts = any_lasts or lasts[i]
-    for _ in range(steps):
+    for _ in range(STEPS):
         worst = missing(
             start, twists, heading, product, free_heading, rows, targets, now, gap, columns
         )
         if worst < least:
             best, least = now.copy(), worst
-        elif least < met:
+        elif least < MET:
             break
-        if worst < exact or not any_lasts:
+        if worst < EXACT or not any_lasts:
             break
         for i in range(n):
             if not lasts[i]:

@@ -41,16 +41,11 @@ def merit(rates: Array, times: Array, barrier: float, gap: Array, weight: float)
 
 
 @inner_kernel
-def correct(problem: TimesProblem, times: Array, gap: Array, columns: Array) -> bool:
-    """Bring times after a full step, in place, nearer to the conditions; whether they stay inside.
-
-    The conditions are curved, so that a step along their tangent misses them, and the merit may
-    rise however near the solution is (the Maratos effect). Each time changes in proportion to
-    itself, so that the long ones give way; `gap` and `columns` are those at `times`, and become
-    those at the corrected ones.
-
-    Source: Nocedal, Wright, Numerical Optimization, 2nd ed., Sec. 15.6.
-    """
+def correct(problem: TimesProblem, times: Array, gap: Array, columns: Array) -> float:
+    """What times after a full step violate, brought nearer to the goal; inf if one vanishes."""
+    # The conditions are curved, so that a step along their tangent misses them, and the merit may
+    # rise however near the solution is (the Maratos effect; Nocedal, Wright, Sec. 15.6). Each time
+    # changes in proportion to itself, so that the long ones give way; all but `problem` in place.
     scaled = jacobian(columns, problem.rows)
     for e in range(gap.size):
         gap[e] = -gap[e]
@@ -59,11 +54,10 @@ def correct(problem: TimesProblem, times: Array, gap: Array, columns: Array) -> 
     change, _rank = least_squares(scaled, gap, 1e-11)
     for i in range(times.size):
         if change[i] < -0.5:
-            return False
+            return np.inf
     for i in range(times.size):
         times[i] += times[i] * change[i]
-    residual(problem, times, columns, gap)
-    return True
+    return residual(problem, times, columns, gap)
 
 
 @inner_kernel
@@ -72,34 +66,27 @@ def interior_point(
 ) -> tuple[bool, Array]:
     """Primal-dual Newton from `times` > 0, in place; returns (converged, slack of each bound)."""
     rates, twists = problem.rates, problem.twists
-    n = times.size
-    n_rows = 3 + problem.targets.size
-    columns = np.empty((n, 3))
-    gap = np.empty(n_rows)
-    trial_gap = np.empty(n_rows)
-    hessian = np.empty((n, n))
-    trial = np.empty(n)
+    n, n_rows = times.size, 3 + problem.targets.size
+    columns, hessian = np.empty((n, 3)), np.empty((n, n))
+    gap, trial_gap = np.empty(n_rows), np.empty(n_rows)
     # State of the method: `times`, multipliers `p` of the conditions, and `slack` (n,), those of
     # the bounds ``times >= 0``. On the central path ``times * slack = barrier`` for each of them.
     # `columns` (n, 3) are derivatives of the end by the times, `gap` the conditions violated, and
     # `trial` and `trial_gap` the same at the point that the line search tries.
-    slack = np.empty(n)
+    slack, trial = np.empty(n), np.empty(n)
     for i in range(n):
         slack[i] = barrier / times[i]
         trial[i] = rates[i] - slack[i]
     worst = residual(problem, times, columns, gap)
     p = multipliers(jacobian(columns, problem.rows), trial)
-    system = np.empty((n + n_rows, n + n_rows))
-    rhs = np.empty(n + n_rows)
+    system, rhs = np.empty((n + n_rows, n + n_rows)), np.empty(n + n_rows)
     stalled = 0  # steps in a row that led nowhere: degenerate words have no end of them
     for _ in range(iterations):
         if stalled == STALLED:
             break
         matrix = jacobian(columns, problem.rows)
         lagrangian_hessian(columns, p[0], p[1], hessian)
-        slope = 0.0
-        complementarity = 0.0
-        centring = 0.0
+        slope, complementarity, centring = 0.0, 0.0, 0.0
         for i in range(n):
             value = rates[i] - slack[i]
             for e in range(n_rows):
@@ -137,8 +124,7 @@ def interior_point(
             for e in range(n_rows):
                 rhs[n + e] = -gap[e]
             step = least_squares(system, rhs, 1e-13)[0]
-            bend = 0.0
-            size = 0.0
+            bend, size = 0.0, 0.0
             for i in range(n):
                 size += step[i] * step[i]
                 bend += step[i] * step[i] * (slack[i] / times[i] + damping)
@@ -148,8 +134,7 @@ def interior_point(
                 break
             damping = max(10.0 * damping, 1e-2)
         # Steps to the boundary, for times and slacks apart: all of them stay positive.
-        longest = 1.0
-        longest_dual = 1.0
+        longest, longest_dual = 1.0, 1.0
         for i in range(n):
             if step[i] < 0.0:
                 longest = min(longest, -0.995 * times[i] / step[i])
@@ -165,22 +150,20 @@ def interior_point(
         for e in range(n_rows):
             weight = max(weight, 2.0 * abs(p[e] + step[n + e]))
         before = merit(rates, times, barrier, gap, weight)
+        before += 1e-12 * abs(before)
         # Halve the step until the merit falls; the last of ten tries is taken as it is.
         share = longest
         for _attempt in range(10):
             for i in range(n):
                 trial[i] = times[i] + share * step[i]
             worst = residual(problem, trial, columns, trial_gap)
-            if merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(before):
+            if merit(rates, trial, barrier, trial_gap, weight) <= before:
                 break
-            inside = _attempt == 0 and correct(problem, trial, trial_gap, columns)
-            if inside and merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(
-                before
-            ):
-                worst = 0.0
-                for e in range(n_rows):
-                    worst = max(worst, abs(trial_gap[e]))
-                break
+            if _attempt == 0:
+                left = correct(problem, trial, trial_gap, columns)
+                if left < np.inf and merit(rates, trial, barrier, trial_gap, weight) <= before:
+                    worst = left
+                    break
             share *= 0.5
         for i in range(n):
             change = (barrier - slack[i] * step[i]) / times[i] - slack[i]
@@ -201,11 +184,8 @@ def interior_point(
 @inner_kernel
 def levenberg_marquardt(problem: TimesProblem, times: Array, iterations: int) -> float:
     """Feasible times near `times`, in place, by projected Levenberg-Marquardt; what is violated."""
-    n = times.size
-    n_rows = 3 + problem.targets.size
-    columns = np.empty((n, 3))
-    gap = np.empty(n_rows)
-    trial = np.empty(n)
+    n, n_rows = times.size, 3 + problem.targets.size
+    columns, gap, trial = np.empty((n, 3)), np.empty(n_rows), np.empty(n)
     worst = residual(problem, times, columns, gap)
     square = 0.0
     for e in range(n_rows):
@@ -216,8 +196,7 @@ def levenberg_marquardt(problem: TimesProblem, times: Array, iterations: int) ->
             break
         residual(problem, times, columns, gap)
         matrix = jacobian(columns, problem.rows)
-        system = np.zeros((n_rows + n, n))
-        rhs = np.zeros(n_rows + n)
+        system, rhs = np.zeros((n_rows + n, n)), np.zeros(n_rows + n)
         for i in range(n):
             # A time at zero that the step would push below stays there: its column is left out.
             pinned = times[i] <= 0.0
@@ -233,8 +212,7 @@ def levenberg_marquardt(problem: TimesProblem, times: Array, iterations: int) ->
         for e in range(n_rows):
             rhs[e] = -gap[e]
         step = least_squares(system, rhs, 1e-14)[0]
-        # Projected on the bounds, then accepted only if the conditions improve; the damping
-        # follows.
+        # Projected on the bounds, then accepted only if the conditions improve.
         for i in range(n):
             trial[i] = max(0.0, times[i] + step[i])
         after = residual(problem, trial, columns, gap)
@@ -256,13 +234,8 @@ def levenberg_marquardt(problem: TimesProblem, times: Array, iterations: int) ->
 def finish(
     problem: TimesProblem, times: Array, slack: Array, keep: IntArray
 ) -> tuple[float, float, Array]:
-    """Set vanishing times to zero and refine the others, in place.
-
-    Returns (largest violation, largest stationarity violated, multipliers).
-    """
-    n = times.size
-    m = problem.targets.size
-    count = 0
+    """Times in place, vanishing ones zero, others refined; (violation, slope, multipliers)."""
+    n, m, count = times.size, problem.targets.size, 0
     for i in range(n):
         # A trim leaves the word where its time is nothing, or small against its slack: then the
         # bound is active, and the time would go to zero with the barrier.
@@ -275,8 +248,7 @@ def finish(
     some_times = np.empty(count)
     for k in range(count):
         some_times[k] = times[keep[k]]
-    p = np.zeros(3 + m)
-    slope = 0.0
+    p, slope = np.zeros(3 + m), 0.0
     # More times than conditions: a minimum, refined by Newton. As many or fewer: the conditions
     # alone fix them, and the multipliers are those that fit best.
     if count > 3 + m:
@@ -303,14 +275,13 @@ def finish(
 def solve_from(problem: TimesProblem, times: Array, barrier: float) -> tuple[int, Array, float]:
     """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
     n = times.size
-    start = np.empty(n)
+    start, inner = np.empty(n), np.empty(n)
     for i in range(n):
         # A start on the boundary has no slack to speak of: away from it by what suits the barrier.
         times[i] = max(times[i], 30.0 * barrier)
         start[i] = times[i]
     keep = np.empty(n, dtype=np.int64)
     _, slack = interior_point(problem, times, barrier, 60)
-    inner = np.empty(n)
     assign(inner, times)
     worst, slope, p = finish(problem, times, slack, keep)
     if worst < 1e-10 and slope < 1e-7:
@@ -331,16 +302,10 @@ def solve_from(problem: TimesProblem, times: Array, barrier: float) -> tuple[int
 def solve_times(
     problem: TimesProblem, starts: Array, best_times: Array
 ) -> tuple[int, float, Array, float]:
-    """Best of several starts (k, n), into `best_times`; returns (status, cost, multipliers, slope).
-
-    Stops at the first start that is solved; later ones are restarts.
-    """
+    """Best of starts (k, n), or the first solved, in place; (status, cost, multipliers, slope)."""
     n = best_times.size
-    times = np.empty(n)
-    best_cost = np.inf
-    best_status = 2
-    best_p = np.zeros(3 + problem.targets.size)
-    best_slope = np.inf
+    times, best_p = np.empty(n), np.zeros(3 + problem.targets.size)
+    best_status, best_cost, best_slope = 2, np.inf, np.inf
     for k in range(starts.shape[0]):
         assign(times, starts[k])
         scale = 0.0
@@ -353,8 +318,7 @@ def solve_times(
         for i in range(n):
             cost += problem.rates[i] * times[i]
         if status < best_status or (status == best_status and cost < best_cost):
-            best_status, best_cost, best_slope = status, cost, slope
-            best_p = p
+            best_status, best_cost, best_slope, best_p = status, cost, slope, p
             assign(best_times, times)
         if status == 0:
             break

@@ -61,10 +61,7 @@ def turn_time(angle: float, turn_rate: float) -> float:
 def two_circles(
     a: complex, b: complex, d: complex, tolerance: float
 ) -> tuple[float, float, float, float]:
-    """Angles (alpha+, beta+, alpha-, beta-) with ``a e^{i alpha} + b e^{i beta} = d``; NaN if none.
-
-    The half-angle of the triangle with sides |a|, |b|, |d|, exact near both tangencies.
-    """
+    """Angles (alpha+, beta+, alpha-, beta-): ``a e^{i alpha} + b e^{i beta} = d``; NaN if none."""
     length_a, length_b, length_d = length(a), length(b), length(d)
     scale = length_a + length_b + length_d
     nothing = (math.nan, math.nan, math.nan, math.nan)
@@ -145,11 +142,9 @@ def steer_two(
     tolerance: float,
     out: Array,
 ) -> None:
-    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can.
-
-    Two times are one fewer than the goal has coordinates: most words of two miss it by far, which
-    a length or a product tells before any angle is taken.
-    """
+    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
+    # Two times are one fewer than the goal has coordinates: most words of two miss it by far, which
+    # a length or a product shows before any angle is taken.
     v_a, w_a = a
     d, e = step
     v_b, w_b = b
@@ -214,9 +209,8 @@ def extents(
     # circle, or two lines.
     d = z + r_a - r_c * turn_3
     at_1 = r_a + d_1 - r_b * turn_1  # multiplies e^{i heading after a}
-    at_2 = (
-        r_b + d_2 - r_c * (unit(e_2) if e_2 != 0.0 else 1.0 + 0j)
-    )  # multiplies e^{i heading after b}
+    turn_2 = unit(e_2) if e_2 != 0.0 else 1.0 + 0j
+    at_2 = r_b + d_2 - r_c * turn_2  # multiplies e^{i heading after b}
     before_c = heading - e_2
     facing = unit(before_c) if e_2 != 0.0 else turn_3
     # By which trims turn: with three turns both headings are unknown; each straight keeps a heading
@@ -318,10 +312,7 @@ def steer_batch(
             (complex(twists[j, 0], twists[j, 1]), twists[j, 2]),
             (complex(twists[l, 0], twists[l, 1]), twists[l, 2]),
         )
-        steps = (
-            (complex(first[0], first[1]), first[2]),
-            (complex(second[0], second[1]), second[2]),
-        )
+        steps = (complex(first[0], first[1]), first[2]), (complex(second[0], second[1]), second[2])
         goal = (complex(goals[row, 0], goals[row, 1]), goals[row, 2], unit(goals[row, 2]))
         steer(trims, steps, goal, (tolerance, -math.inf), times[row])
     return times

@@ -34,9 +34,7 @@ class TimesProblem(NamedTuple):
 def columns_of(problem: TimesProblem, word: IntArray, n: int) -> TimesProblem:
     """The problem of the first `n` trims of a word of a library."""
     m = problem.targets.size
-    twists = np.empty((n, 4))
-    rates = np.empty(n)
-    rows = np.empty((m, n))
+    twists, rates, rows = np.empty((n, 4)), np.empty(n), np.empty((m, n))
     for i in range(n):
         assign(twists[i], problem.twists[word[i]])
         rates[i] = problem.rates[word[i]]
@@ -54,11 +52,9 @@ def assign(target: Array, source: Array) -> None:
 
 @inner_kernel
 def end_and_columns(twists: Array, times: Array, columns: Array) -> tuple[float, float, float]:
-    """End pose (x, y, heading) of a word; fills `columns` (n, 3) with its derivatives by the times.
-
-    A trim that lasts longer turns all that follows about its own instantaneous centre:
-    column i is ``(R v_i + w_i J (end - p_i), w_i)`` in the world, p_i any point of trim i.
-    """
+    """End pose (x, y, heading) of a word; fills `columns` (n, 3) with derivatives by the times."""
+    # A trim that lasts longer turns all that follows about its own instantaneous centre:
+    # column i is ``(R v_i + w_i J (end - p_i), w_i)`` in the world, p_i any point of trim i.
     n = times.size
     x, y, heading = 0.0, 0.0, 0.0
     for i in range(n):
@@ -98,9 +94,7 @@ def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple
     Householder QR with column pivoting (Golub, Van Loan, Matrix Computations, Alg. 5.4.1).
     """
     m, n = matrix.shape
-    order = np.arange(n)
-    rank = 0
-    largest = 0.0
+    order, rank, largest = np.arange(n), 0, 0.0
     for k in range(min(m, n)):
         # The longest column that is left comes next: the rank is how many are longer than the
         # tolerance of the longest of all, so words whose columns do not span are solved like any
@@ -157,13 +151,9 @@ def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple
 
 @inner_kernel
 def residual(problem: TimesProblem, times: Array, columns: Array, out: Array) -> float:
-    """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns its largest entry.
-
-    The heading is compared modulo a full turn.
-    """
+    """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns the largest."""
     x, y, heading = end_and_columns(problem.twists, times, columns)
-    out[0] = x - problem.goal[0]
-    out[1] = y - problem.goal[1]
+    out[0], out[1] = x - problem.goal[0], y - problem.goal[1]
     out[2] = nearest_turn(heading - problem.goal[2])
     for r in range(problem.targets.size):
         value = -problem.targets[r]
@@ -182,9 +172,7 @@ def jacobian(columns: Array, rows: Array) -> Array:
     n = columns.shape[0]
     matrix = np.empty((3 + rows.shape[0], n))
     for i in range(n):
-        matrix[0, i] = columns[i, 0]
-        matrix[1, i] = columns[i, 1]
-        matrix[2, i] = columns[i, 2]
+        matrix[0, i], matrix[1, i], matrix[2, i] = columns[i, 0], columns[i, 1], columns[i, 2]
         for r in range(rows.shape[0]):
             matrix[3 + r, i] = rows[r, i]
     return matrix
@@ -194,8 +182,7 @@ def jacobian(columns: Array, rows: Array) -> Array:
 def multipliers(matrix: Array, rates: Array) -> Array:
     """Multipliers (3 + m,) that best make ``rates + matrix^T multipliers`` vanish."""
     m, n = matrix.shape
-    transposed = np.empty((n, m))
-    rhs = np.empty(n)
+    transposed, rhs = np.empty((n, m)), np.empty(n)
     for i in range(n):
         rhs[i] = -rates[i]
         for e in range(m):
@@ -209,23 +196,17 @@ def newton_stationary(
 ) -> tuple[Array, float, float]:
     """Newton on ``rates + J^T p = 0, conditions = 0`` without bounds, from `times`, in place.
 
-    Returns the multipliers (3 + m,), the largest condition violated and the largest
-    stationarity violated.
+    Returns the multipliers (3 + m,), the largest condition and the largest slope violated.
     """
-    n = times.size
-    n_rows = 3 + problem.targets.size
-    columns = np.empty((n, 3))
-    gap = np.empty(n_rows)
-    hessian = np.empty((n, n))
+    n, n_rows = times.size, 3 + problem.targets.size
+    columns, gap, hessian = np.empty((n, 3)), np.empty(n_rows), np.empty((n, n))
     worst = residual(problem, times, columns, gap)
     p = multipliers(jacobian(columns, problem.rows), problem.rates)
     slope = np.inf
     for _ in range(iterations):
         matrix = jacobian(columns, problem.rows)
         lagrangian_hessian(columns, p[0], p[1], hessian)
-        system = np.zeros((n + n_rows, n + n_rows))
-        rhs = np.empty(n + n_rows)
-        slope = 0.0
+        system, rhs, slope = np.zeros((n + n_rows, n + n_rows)), np.empty(n + n_rows), 0.0
         for i in range(n):
             value = problem.rates[i]
             for e in range(n_rows):
@@ -262,9 +243,7 @@ def newton_stationary(
 def newton_feasible(problem: TimesProblem, times: Array, iterations: int) -> float:
     """Gauss-Newton on the conditions alone, from `times`, in place; the largest one violated."""
     n = times.size
-    columns = np.empty((n, 3))
-    gap = np.empty(3 + problem.targets.size)
-    best = np.empty(n)
+    columns, gap, best = np.empty((n, 3)), np.empty(3 + problem.targets.size), np.empty(n)
     # The last steps are below rounding, and a worse one may follow a better: the best is kept.
     assign(best, times)
     worst = residual(problem, times, columns, gap)
@@ -289,15 +268,10 @@ def newton_feasible(problem: TimesProblem, times: Array, iterations: int) -> flo
 
 @inner_kernel
 def curvature(problem: TimesProblem, times: Array, p: Array) -> float:
-    """Smallest pivot of the Lagrangian's Hessian on the null space of the conditions.
-
-    Positive: no small feasible change of the times is cheaper. `inf` where nothing can change.
-    """
+    """Least pivot of the Hessian where conditions hold: positive at a minimum; inf for none."""
     n = times.size
-    columns = np.empty((n, 3))
-    gap = np.empty(3 + problem.targets.size)
+    columns, gap, hessian = np.empty((n, 3)), np.empty(3 + problem.targets.size), np.empty((n, n))
     residual(problem, times, columns, gap)
-    hessian = np.empty((n, n))
     lagrangian_hessian(columns, p[0], p[1], hessian)
     basis = null_space(jacobian(columns, problem.rows))
     d = basis.shape[1]
@@ -328,10 +302,7 @@ def curvature(problem: TimesProblem, times: Array, p: Array) -> float:
 def null_space(matrix: Array) -> Array:
     """Basis (n, n - rank) of what `matrix` (m, n) maps to zero; Gauss-Jordan, full pivoting."""
     m, n = matrix.shape
-    work = np.empty((m, n))
-    order = np.arange(n)
-    rank = 0
-    largest = 0.0
+    work, order, rank, largest = np.empty((m, n)), np.arange(n), 0, 0.0
     for i in range(m):
         for j in range(n):
             work[i, j] = matrix[i, j]

@@ -18,13 +18,10 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.groups.se2 import chained, coasted
-from maneuver_automaton.words import _kernels_closing
 from maneuver_automaton.words import _kernels_steering as kernels
+from maneuver_automaton.words._kernels_closing import MET, STEPS, close_times
 
-STEPS = 8
 RANK = 1e-9  # singular values below this, relative, count as none
-MET = 1e-9  # [m, rad, s] below this a condition is met, and no step that misses more is followed
-EXACT = 1e-15  # nothing is left to be closed
 
 
 def conjugated(twists: Array, displacements: Array) -> tuple[Array, Array]:
@@ -86,23 +83,17 @@ class EndConditions:
             aim[2] = end[2] if self.product is None else end[2] + self.product[2]
         gap = (aim if self.product is None else goal_before(aim, self.product)) - end
         gap[2] = math.remainder(float(gap[2]), 2.0 * math.pi)
-        if self.free_heading:
-            self._follow_the_heading(end, gap, columns)
+        if self.free_heading:  # the aim turns with the end: no condition is left on the heading
+            if self.product is not None:
+                x, y = self.product[:2]
+                cos, sin = math.cos(end[2]), math.sin(end[2])
+                columns[0] -= (sin * x + cos * y) * columns[2]
+                columns[1] -= (sin * y - cos * x) * columns[2]
+            columns[2], gap[2] = 0.0, 0.0
         if self.rows is None:
             return gap, columns
-        return (
-            np.concatenate([gap, self.targets - self.rows @ times]),
-            np.vstack([columns, self.rows]),
-        )
-
-    def _follow_the_heading(self, end: Array, gap: Array, columns: Array) -> None:
-        """Let the aim turn with the end, so that no condition is left on the heading."""
-        if self.product is not None:
-            x, y = self.product[:2]
-            c, s = math.cos(end[2]), math.sin(end[2])
-            columns[0] -= (s * x + c * y) * columns[2]
-            columns[1] -= (s * y - c * x) * columns[2]
-        columns[2], gap[2] = 0.0, 0.0
+        left = self.targets - self.rows @ times
+        return np.concatenate([gap, left]), np.vstack([columns, self.rows])
 
 
 def closest_times(
@@ -123,7 +114,7 @@ def closest_times(
     rows = np.zeros((len(conditions.targets), n))
     if conditions.rows is not None:
         rows[:] = conditions.rows
-    return _kernels_closing.close_times(
+    return close_times(
         start,
         twists,
         float(conditions.goal[2]),
@@ -134,9 +125,6 @@ def closest_times(
         np.array(durations, dtype=np.float64),
         float(rank),
         float(at_least),
-        STEPS,
-        MET,
-        EXACT,
     )
 
 

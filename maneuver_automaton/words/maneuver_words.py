@@ -110,9 +110,5 @@ def _plan(problem: Problem, first: int, row: IntArray, times: Array) -> Plan:
     maneuvers = tuple(automaton.maneuvers[k] for k in row.tolist())
     trims = (automaton.trims[first], *(automaton[one.target] for one in maneuvers))
     return Plan(
-        problem.start,
-        trims,
-        durations=times,
-        maneuvers=maneuvers,
-        start_time=problem.start_time,
+        problem.start, trims, durations=times, maneuvers=maneuvers, start_time=problem.start_time
     )

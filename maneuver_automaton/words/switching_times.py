@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.words import _kernels_solve as kernels
+from maneuver_automaton.words._kernels_closing import MET
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.closing import MET, conjugated, conjugated_turn, goal_before
+from maneuver_automaton.words.closing import conjugated, conjugated_turn, goal_before
 
 RESTARTS = 12  # further starts where the first one fails
 TURNS = (0.5, 2.0 * math.pi - 0.5)  # [rad] of a free heading that iterations start with
@@ -139,25 +140,12 @@ def solve_switching_times(
     steps = _steps(displacements, n, end.size)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
-
-    def solved_from(floors: Array, free: NDArray[np.bool_]) -> SwitchingTimes:
-        word = _ConjugatedWord(rows, steps, floors, end, free_heading)
-        return word.solved(prices, free, given, starts, restarts)
-
-    return _within(floors, limits, solved_from)
-
-
-def _within(
-    floors: Array,
-    limits: Array,
-    solved_from: Callable[[Array, NDArray[np.bool_]], SwitchingTimes],
-) -> SwitchingTimes:
-    """Best times of at least `floors` (n,), those fixed one by one that exceed `limits` (n,)."""
     if (floors > limits).any():
-        return _failed(floors.size)
-    free = np.ones(floors.size, dtype=np.bool_)
-    while True:
-        solved = solved_from(floors, free)
+        return _failed(n)
+    free = np.ones(n, dtype=np.bool_)
+    while True:  # those that exceed their limits are fixed, one by one
+        word = _ConjugatedWord(rows, steps, floors, end, free_heading)
+        solved = word.solved(prices, free, given, starts, restarts)
         late = free & (solved.durations > limits)
         if solved.status is TimesStatus.FAILED or not late.any():
             return solved
@@ -303,8 +291,5 @@ def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:
 
 def _failed(n: int) -> SwitchingTimes:
     return SwitchingTimes(
-        status=TimesStatus.FAILED,
-        durations=np.zeros(n),
-        cost=math.inf,
-        multipliers=np.zeros(3),
+        status=TimesStatus.FAILED, durations=np.zeros(n), cost=math.inf, multipliers=np.zeros(3)
     )
