@@ -24,12 +24,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.words import TimesStatus, solve_switching_times
-from maneuver_automaton.words.closing import (
-    EndConditions,
-    closest_times,
-    conjugated,
-    times_through,
-)
+from maneuver_automaton.words.closing import EndConditions, closest_times, conjugated, times_through
 
 TIME_TOLERANCE = 1e-9  # [s] by which a time may miss a limit, and as a share of the limit
 NO_TIME = 0.0  # [s] a trim that lasts no longer is not one of the word
