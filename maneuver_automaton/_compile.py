@@ -242,11 +242,7 @@ def _cached(
     import numba
 
     compiled = numba.njit(
-        nogil=True,
-        error_model="numpy",
-        no_cfunc_wrapper=True,
-        **_pipeline(compiler),
-        **options,
+        nogil=True, error_model="numpy", no_cfunc_wrapper=True, **_pipeline(compiler), **options
     )(function)
     folder = kernel_folder()
     if folder is not None and compiled is not function:  # it is, where numba is switched off

@@ -19,14 +19,7 @@ from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import (
-    AnyObstacle,
-    AnyShape,
-    Box,
-    OccupancyMap,
-    Shape,
-    as_shapes,
-)
+from maneuver_automaton.collision import AnyObstacle, AnyShape, Box, OccupancyMap, Shape, as_shapes
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.motion import planar

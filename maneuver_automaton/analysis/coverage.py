@@ -83,10 +83,7 @@ def settings_for(automaton: Automaton) -> CoverageSettings:
 
 
 def dispersion(
-    automaton: Automaton,
-    *,
-    start: str | None = None,
-    settings: CoverageSettings | None = None,
+    automaton: Automaton, *, start: str | None = None, settings: CoverageSettings | None = None
 ) -> Dispersion:
     """Distance of a pose in a ball to the nearest that words of bounded cost reach, at most.
 

@@ -93,11 +93,7 @@ def check_library(
 
 
 def turn_move_turn(
-    start: ArrayLike,
-    goal: ArrayLike,
-    *,
-    body_velocities: ArrayLike,
-    angle_tolerance: float = 1e-12,
+    start: ArrayLike, goal: ArrayLike, *, body_velocities: ArrayLike, angle_tolerance: float = 1e-12
 ) -> TrimSequence:
     """Spin until the goal lies ahead, drive there, spin to its heading: the quickest such word.
 

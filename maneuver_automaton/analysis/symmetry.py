@@ -184,10 +184,7 @@ def _question(what: str, name: str, per: str, region: Region) -> Question:
         return f"{unit_of(names[i])}{per}" if i < region.group.dof else ""
 
     return Question(
-        what=what,
-        names=lambda i: name.format(names[i]),
-        units=units,
-        cause=_cause_in(region),
+        what=what, names=lambda i: name.format(names[i]), units=units, cause=_cause_in(region)
     )
 
 

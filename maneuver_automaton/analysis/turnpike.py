@@ -158,11 +158,7 @@ def _trajectory_of(
             ]
         ),
         control=np.concatenate(
-            [
-                begin.control[:-1],
-                np.tile(trim.control, (times.size - 1, 1)),
-                down.course.control,
-            ]
+            [begin.control[:-1], np.tile(trim.control, (times.size - 1, 1)), down.course.control]
         ),
     )
 

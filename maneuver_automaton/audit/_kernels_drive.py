@@ -1,55 +1,16 @@
-"""Where controls lead: stretches cut to elements, the frame's motion over each, what is stated."""
+"""Where controls lead: the frame's motion over each element, and what is stated of it."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.audit._kernels_edges import place_along
 from maneuver_automaton.audit.arrays import Ended, Stated, TimeElements
 from maneuver_automaton.audit.frames import Collocation, FrameMotion
-
-
-@kernel
-def cut(
-    stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_], most: float
-) -> TimeElements:
-    """Runs of one control within a primitive that turn by no more than `most` [rad], or parts.
-
-    A stretch that stands `alone` is a run, in as many equal parts.
-    """
-    n = turns.size
-    run, begins, count = np.empty(n, np.int64), np.empty(n, np.int64), 0
-    turned, step = 0.0, -1.0
-    for k in range(n):
-        turned += turns[k]
-        before, step = step, math.floor((turned - turns[k]) / most)
-        goes_on = k > 0 and not (alone[k] or alone[k - 1]) and step == before
-        goes_on = goes_on and stated.pieces[k] == stated.pieces[k - 1]
-        if not (goes_on and (stated.controls[k] == stated.controls[k - 1]).all()):
-            begins[count] = k
-            count += 1
-        run[k] = count - 1
-    total = 0
-    for r in range(count):
-        total += parts[begins[r]]
-    first, runs = np.empty(total, np.int64), np.empty(total, np.int64)
-    share, lengths = np.empty(total), np.empty(total)
-    e = 0
-    for r in range(count):
-        end, lasts = begins[r + 1] if r + 1 < count else n, 0.0
-        for k in range(begins[r], end):
-            lasts += stated.lengths[k]
-        several = parts[begins[r]]
-        for number in range(several):
-            first[e], runs[e] = begins[r], r
-            share[e], lengths[e] = number / several, lasts / several
-            e += 1
-    return TimeElements(first, share, lengths, runs, run)
 
 
 @inner_kernel
@@ -67,11 +28,11 @@ def _most(known: float, value: float) -> float:
     return value if value > known else known if value == value else math.inf
 
 
-@inner_kernel
-def _bounded(
-    lengths: Array, series: Array, nodes: Array, twists: Array, error: Array, rules: Collocation
+@kernel
+def bounded(
+    series: Array, nodes: Array, error: Array, twists: Array, lengths: Array, rules: Collocation
 ) -> FrameMotion:
-    """What `bounded` returns."""
+    """A motion whose series (e, n, dof) and `nodes` (e, N, dof) are known, with its bounds."""
     n, dof = lengths.size, twists.shape[2]
     times, most, change = np.zeros(n + 1), np.empty((n, dof)), np.empty((n, dof))
     speed, bend, swerve, rise, length = np.empty(n), np.empty(n), np.empty(n), np.empty(n), 0.0
@@ -94,16 +55,10 @@ def _bounded(
 
 
 @kernel
-def bounded(
-    lengths: Array, series: Array, nodes: Array, twists: Array, error: Array, rules: Collocation
-) -> FrameMotion:
-    """A motion whose series (e, n, dof) and `nodes` (e, N, dof) are known, with its bounds."""
-    return _bounded(lengths, series, nodes, twists, error, rules)
-
-
-@kernel
-def motion_along(start: Array, twists: Array, lengths: Array, rules: Collocation) -> FrameMotion:
-    """From a pose (dof,), under twists (e, N, dof) at the nodes of elements of lengths (e,) [s].
+def motion_along(
+    start: Array, twists: Array, lengths: Array, rules: Collocation
+) -> tuple[Array, Array, Array]:
+    """Series, nodes and error from a pose (dof,), under twists (e, N, dof) over lengths (e,) [s].
 
     The heading is the integral of the turn rate, the place that of the velocity seen with it.
     """
@@ -130,7 +85,7 @@ def motion_along(start: Array, twists: Array, lengths: Array, rules: Collocation
             for k in range(n_nodes - 2, n_nodes):
                 error[e] = _most(error[e], abs(_term(rules.series[k], rates, d)) * h)
             pose[d] += gained
-    return _bounded(lengths, series, nodes, twists, error, rules)
+    return series, nodes, error
 
 
 @kernel

@@ -86,6 +86,14 @@ class Spans(NamedTuple):
     begin: Array  # (m,) share of the element
     end: Array  # (m,)
 
+    @classmethod
+    def evenly(cls, parts: Array | IntArray) -> Spans:
+        """Each element (n,) in as many equal stretches at least, and in one."""
+        count = np.maximum(np.ceil(parts), 1.0).astype(np.int64)
+        element = np.repeat(np.arange(count.size), count)
+        number = np.arange(element.size) - (np.cumsum(count) - count)[element]
+        return cls(element, number / count[element], (number + 1) / count[element])
+
     def of(self, rows: Any) -> Spans:
         """Some of them, by number, slice or truth."""
         return Spans(self.element[rows], self.begin[rows], self.end[rows])
@@ -103,7 +111,6 @@ class Stated(NamedTuple):
     pieces: IntArray  # (n,) number of the primitive
 
 
-@by_value
 class TimeElements(NamedTuple):
     """How stretches are cut: an element is a run of stretches, or a part of one."""
 

@@ -104,59 +104,27 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     Source: Hairer, Lubich, Wanner (2006), *Geometric Numerical Integration*, Sec. II.1.3.
     """
     stated = stated_by(plan)
-    if not stated.lengths.size:
-        return _standing(plan, model, stated)
+    if stated is None:
+        return _standing(plan, model)
     begin_twists = model.body_velocity(stated.states, stated.controls)
     turns = np.abs(begin_twists[..., 2]) * stated.lengths
     parts = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
     alone = parts > 1
     for _ in range(HALVINGS):
-        elements = kernels.cut(stated, turns, parts, alone, TURN)
-        found = _integrated(plan.start, model, stated, elements, begin_twists)
-        last = np.maximum(found.reduced.error, found.frames.error)
-        rough = ~(last <= EXACT * (1.0 + found.frames.length))
+        elements = cut(stated, turns, parts, alone)
+        reduced, twists, frames = _integrated(plan.start, model, stated, elements, begin_twists)
+        rough = ~(np.maximum(reduced.error, frames.error) <= EXACT * (1.0 + frames.length))
         if not rough.any():
             break
         again = np.isin(elements.run, elements.runs[rough])
         parts = np.where(again & alone, 2 * parts, parts)
         alone = alone | again
-    return _compared(plan, model, stated, elements, found)
-
-
-class _Integrated(NamedTuple):
-    reduced: Reduced
-    twists: Array  # (e, N, dof) at the nodes
-    frames: FrameMotion
-
-
-def _integrated(
-    start: Array, model: Model, stated: Stated, elements: TimeElements, begin_twists: Array
-) -> _Integrated:
-    """Reduced states on all elements, then the poses."""
-    first, share = elements.first, elements.share[:, None]
-    guess = stated.states[first] + share * (stated.end_states[first] - stated.states[first])
-    controls = stated.controls[first]
-    reduced = reduced_states(model, controls, elements.lengths, guess, elements.share == 0.0)
-    twists = np.empty((first.size, N, start.size))
-    twists[:] = begin_twists[first, None]  # of a vehicle without a state, all along
-    if guess.shape[1]:
-        twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
-    return _Integrated(
-        reduced, twists, kernels.motion_along(start.copy(), twists, elements.lengths, RULES)
-    )
-
-
-def _compared(
-    plan: Plan, model: Model, stated: Stated, elements: TimeElements, found: _Integrated
-) -> DrivenPlan:
-    """The drive, and the greatest difference to what the plan states of it."""
-    reduced, frames = found.reduced, found.frames
     # What a reduced state is off moves the vehicle for as long as it is driven.
     has_states = bool(reduced.series.shape[2])
     if has_states:
         doubt = reduced.error + reduced.jumps / reduced.error.size
         frames = frames._replace(error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
-    there = kernels.compared(stated, elements, frames, found.twists)
+    there = kernels.compared(stated, elements, frames, twists)
     off, states = there.off, stated.end_states
     if has_states:
         states = values_at(reduced.series[there.element], np.minimum(there.share, 1.0))
@@ -166,7 +134,7 @@ def _compared(
         plan=plan,
         model=model,
         frames=frames,
-        twists=found.twists,
+        twists=twists,
         states=reduced.nodes,
         end=there.poses[-1],
         off=off + reduced.jumps,
@@ -176,6 +144,34 @@ def _compared(
         controls=stated.controls,
         sampled_states=np.concatenate([stated.states[:1], states]),
     )
+
+
+def cut(stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_]) -> TimeElements:
+    """Runs of one control within a primitive that turn by no more than `TURN`, or equal parts."""
+    controls, pieces = stated.controls, stated.pieces
+    turned = np.floor((np.cumsum(turns) - turns) / TURN)
+    breaks = np.ones(pieces.size, dtype=np.bool_)
+    breaks[1:] = (pieces[1:] != pieces[:-1]) | alone[1:] | alone[:-1] | (turned[1:] != turned[:-1])
+    breaks[1:] |= (controls[1:] != controls[:-1]).any(axis=1)
+    run, begins = np.cumsum(breaks) - 1, np.flatnonzero(breaks)
+    of, share, _ = Spans.evenly(parts[begins])
+    lengths = np.bincount(run, weights=stated.lengths) / parts[begins]
+    return TimeElements(begins[of], share, lengths[of], of, run)
+
+
+def _integrated(
+    start: Array, model: Model, stated: Stated, elements: TimeElements, begin_twists: Array
+) -> tuple[Reduced, Array, FrameMotion]:
+    """Reduced states on all elements, twists (e, N, dof) at the nodes, then the poses."""
+    first, share = elements.first, elements.share[:, None]
+    guess = stated.states[first] + share * (stated.end_states[first] - stated.states[first])
+    controls = stated.controls[first]
+    reduced = reduced_states(model, controls, elements.lengths, guess, elements.share == 0.0)
+    twists = np.empty((first.size, N, start.size))
+    twists[:] = begin_twists[first, None]  # of a vehicle without a state, all along
+    if guess.shape[1]:
+        twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
+    return reduced, twists, frames_along(start, twists, elements.lengths)
 
 
 def _frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
@@ -189,10 +185,16 @@ def _frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
     twists[..., 0] = cosine * rates[..., 0] + sine * rates[..., 1]
     twists[..., 1] = cosine * rates[..., 1] - sine * rates[..., 0]
     last = like.error + np.abs(series[:, -2:]).max(axis=(1, 2))
-    return kernels.bounded(lengths, series, poses, twists, last, RULES)
+    return kernels.bounded(series, poses, last, twists, lengths, RULES)
 
 
-def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
+def frames_along(start: Array, twists: Array, lengths: Array) -> FrameMotion:
+    """From a pose (dof,), under twists (e, N, dof) at the nodes of elements of lengths (e,) [s]."""
+    found = kernels.motion_along(start.copy(), twists, lengths, RULES)
+    return kernels.bounded(*found, twists, lengths, RULES)
+
+
+def _standing(plan: Plan, model: Model) -> DrivenPlan:
     """Of a plan that lasts no time: one element of rest."""
     still = np.zeros((1, N, plan.start.size))
     # Without a trim it rests, with all at zero.
@@ -200,26 +202,23 @@ def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
     return DrivenPlan(
         plan=plan,
         model=model,
-        frames=kernels.motion_along(plan.start.copy(), still, np.full(1, NOTHING), RULES),
+        frames=frames_along(plan.start, still, np.full(1, NOTHING)),
         twists=still,
         states=np.tile(states, (1, N, 1)),
         end=plan.start,
         off=0.0,
         turned=0.0,
         ends=np.zeros(0),
-        pieces=stated.pieces,
-        controls=stated.controls,
-        sampled_states=stated.states,
+        pieces=np.zeros(0, dtype=np.int64),
+        controls=np.zeros((0, len(model.control_names))),
+        sampled_states=np.zeros((0, states.size)),
     )
 
 
-def stated_by(plan: Plan) -> Stated:
-    """The stretches of a plan: trims whole, maneuvers from sample to sample."""
+def stated_by(plan: Plan) -> Stated | None:
+    """The stretches of a plan, trims whole, maneuvers from sample to sample; None of no time."""
     poses, lengths = plan.switching_poses, plan.primitive_durations
     lasting = np.flatnonzero(lengths > NOTHING)
-    if not any(plan.maneuvers) and lasting.size:
-        trims = [plan.trims[k] for k in lasting.tolist()]
-        return _trims(trims, lasting, lengths[lasting], poses[lasting + 1])
     rows: list[Stated] = []
     # Trims that follow each other are one run; every maneuver stands alone.
     for _, run in groupby(
@@ -235,10 +234,8 @@ def stated_by(plan: Plan) -> Stated:
             for one, k in zip(pieces, numbers.tolist(), strict=True)
             if isinstance(one, Maneuver)
         ]
-    if not rows:
-        return _nothing(plan)
-    if len(rows) == 1:
-        return rows[0]
+    if len(rows) < 2:
+        return rows[0] if rows else None
     return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
@@ -265,15 +262,6 @@ def _maneuver(maneuver: Maneuver, number: int, begin: Array) -> Stated:
         np.full_like(poses[lasting], np.nan),
         np.full(int(lasting.sum()), number),
     )
-
-
-def _nothing(plan: Plan) -> Stated:
-    trim = plan.trims[0] if plan.trims else None
-    states = np.zeros((0, 0 if trim is None else trim.reduced_state.size))
-    controls = np.zeros((0, 0 if trim is None else trim.control.size))
-    poses = np.zeros((0, plan.start.size))
-    none = np.zeros(0, dtype=np.int64)
-    return Stated(np.zeros(0), controls, states, states, poses, poses, none)
 
 
 class Reduced(NamedTuple):

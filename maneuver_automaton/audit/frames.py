@@ -58,23 +58,16 @@ N = 12  # nodes: over a radian, a cosine is exact to rounding between them too
 _points, _weights = leggauss(N)
 _values = legvander(_points, N - 1)  # (node, degree)
 _degrees = np.arange(N)
-_unit = [np.eye(N + 1)[k, : k + 1] for k in range(N + 1)]
 
 NODES: Array = 0.5 * (1.0 + _points)  # (N,) shares of an element
 SERIES: Array = ((2 * _degrees + 1) * _values * (0.5 * _weights)[:, None]).T  # values to series
 SLOPES: Array = _degrees * (_degrees + 1.0)  # (N,) greatest slope of each term, per element
 
 
-def _integrals() -> Array:
-    """Series (N + 1, N) of the integrals from 0 of the terms of a series."""
-    rows = np.zeros((N + 1, N))
-    rows[:2, 0] = 0.5
-    for k in range(1, N):
-        rows[k + 1, k], rows[k - 1, k] = 0.5 / (2 * k + 1), -0.5 / (2 * k + 1)
-    return rows
-
-
-INTEGRAL: Array = _integrals() @ SERIES  # values at nodes to the series of their integral
+_halves = 0.5 / (2 * _degrees + 1)  # series of the integrals from 0 of the terms of a series
+_integrals = np.eye(N + 1, N, -1) * _halves - np.eye(N + 1, N, 1) * _halves
+_integrals[0, 0] = 0.5
+INTEGRAL: Array = _integrals @ SERIES  # values at nodes to the series of their integral
 TO_NODES: Array = legvander(_points, N) @ INTEGRAL  # (N, N) to the integral up to each node
 TO_END: Array = INTEGRAL.sum(axis=0)  # (N,) to the integral over the element
 
@@ -103,7 +96,7 @@ class Collocation(NamedTuple):
 RULES = Collocation(INTEGRAL, TO_NODES, np.ascontiguousarray(SERIES), SLOPES)
 
 # Terms as sums of powers: those of high degree, whose factors are large, are tiny where it counts.
-_POWERS: Array = np.array([np.pad(leg2poly(row), (0, N - k)) for k, row in enumerate(_unit)])
+_POWERS: Array = np.array([np.pad(leg2poly([0.0] * k + [1.0]), (0, N - k)) for k in range(N + 1)])
 
 
 def values_at(series: Array, shares: Array) -> Array:

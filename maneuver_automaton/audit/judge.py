@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,8 +177,14 @@ def audit_plan(
         abs(float(t.body_velocity[2])) * d for t, d in zip(near.trims, near.durations, strict=True)
     )
     if turned > MOST_TURNED:
-        return _not_driven(
-            near, goal, f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}"
+        missed = distance_to(near.end, goal)
+        return Audit(
+            passed=False,
+            max_dynamics_defect=math.inf,
+            min_clearance_m=None,
+            terminal_position_m=missed.position_m,
+            terminal_heading_rad=missed.heading_rad,
+            reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
         )
     drive = driven(near, model)
     missed = distance_to(drive.end, goal)
@@ -197,21 +203,26 @@ def audit_plan(
     bodies = {"": _body(drive.frames, footprint, plan, goal, body_height)}
     for name, shapes in (parts or {}).items() if obstacles or zones else ():
         bodies[name] = _body(drive.part(name), shapes, plan, goal, body_height)
-    scene = (obstacles, origin, margin, ask)
-    distances = []
+    distances, enough = [], max(CONTACT, margin - CONTACT)  # touching never is
     for name, body in bodies.items() if obstacles else ():
-        least, hit = _clearance(body, around(obstacles, origin), *scene)
+        beside = around(obstacles, origin)
+        ask()
+        spans = spans_within(body, 0.0, math.inf)
+        least = least_clearance(body, beside, spans, enough=enough, ask=ask)
         distances.append(least.distance)
-        reasons += [f"the {name}: {hit}" if name else hit] if hit else []
+        if not _keeps(least, enough):
+            at = least.time
+            hit = what_is_hit(body, beside, obstacles, time=at, margin=margin, origin=origin)
+            reasons.append(f"the {name}: {hit}" if name else hit)
     reasons += zones_broken(drive, list(bodies.values()), zones, origin)
     prices: list[float] = []
     if places is not None and places.costs:
         ask()
         offset = np.array(goal.pose)
         offset[2] = 0.0
-        beside = list(bodies.values()), around(obstacles, origin)
+        known = list(bodies.values()), around(obstacles, origin)
         for cost, stated in zip(places.costs, places.prices, strict=True):
-            prices.append(price_again(cost, drive, offset, *beside, whole=places.whole))
+            prices.append(price_again(cost, drive, offset, *known, whole=places.whole))
             if not abs(prices[-1] - stated) <= AGREED * places.whole:
                 what = type(cost).__name__
                 reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")
@@ -257,19 +268,6 @@ def _missed_on_the_way(
         for k, at in enumerate(met, 1)
         if at is None
     ]
-
-
-def _not_driven(near: Plan, goal: Goal, reason: str) -> Audit:
-    """The audit of a plan that nobody can drive again."""
-    missed = distance_to(near.end, goal)
-    return Audit(
-        passed=False,
-        max_dynamics_defect=math.inf,
-        min_clearance_m=None,
-        terminal_position_m=missed.position_m,
-        terminal_heading_rad=missed.heading_rad,
-        reason=reason,
-    )
 
 
 def closest_to(
@@ -336,7 +334,7 @@ def closest_to(
         body = _body(frames, shapes, plan, goal, body_height)
         spans = spans_within(body, first, last)
         least = least_clearance(body, around, spans, enough=enough, ask=ask)
-        hit = -1 if _keeps(least, enough) else nearest_at(body, around, least.time).obstacle
+        hit = -1 if _keeps(least, enough) else nearest_at(body, around, least.time)[2]
         found.append(least._replace(time=clock + least.time, obstacle=hit, part=name))
     return min(found, key=lambda one: (one.obstacle < 0, one.distance))
 
@@ -358,25 +356,6 @@ def _body(
         base=float(goal.pose[3:].sum()),
         clock=plan.start_time,
     )
-
-
-def _clearance(
-    body: AuditedBody,
-    around: Surroundings,
-    obstacles: tuple[AnyObstacle, ...],
-    origin: tuple[float, float],
-    margin: float,
-    ask: Callable[[], None],
-) -> tuple[Least, str]:
-    """The least clearance of a body, and what it hits; empty if it keeps the margin [m]."""
-    enough = max(CONTACT, margin - CONTACT)  # touching never is
-    ask()
-    spans = spans_within(body, 0.0, math.inf)
-    least = least_clearance(body, around, spans, enough=enough, ask=ask)
-    if _keeps(least, enough):
-        return least, ""
-    at = least.time
-    return least, what_is_hit(body, around, obstacles, time=at, margin=margin, origin=origin)
 
 
 def _keeps(least: Least, enough: float) -> bool:
@@ -406,10 +385,8 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
     limit = getattr(model, "max_lateral_acceleration", None)
     if limit is not None:
         spans, _ = drive.between_samples()
-        twists = drive.twists_at(
-            np.tile(spans.element, 3),
-            np.concatenate([spans.begin, 0.5 * (spans.begin + spans.end), spans.end]),
-        )
+        shares = np.concatenate([spans.begin, 0.5 * (spans.begin + spans.end), spans.end])
+        twists = drive.twists_at(np.tile(spans.element, 3), shares)
         across = float((np.hypot(twists[:, 0], twists[:, 1]) * np.abs(twists[:, 2])).max())
         if across - limit > LIMIT_TOLERANCE * max(1.0, limit):
             reasons.append(
@@ -431,24 +408,17 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
     return reasons
 
 
-class NearestEdge(NamedTuple):
-    """The edge that is nearest to a body at a time."""
-
-    pairs: EdgePairs
-    row: int
-    obstacle: int
-    distance: float  # [m]
-
-
-def nearest_at(body: AuditedBody, around: Surroundings, time: float) -> NearestEdge:
-    """The edge that is nearest at a time since the start [s]."""
+def nearest_at(
+    body: AuditedBody, around: Surroundings, time: float
+) -> tuple[EdgePairs, int, int, float]:
+    """All edges at a time since the start [s]; row, obstacle and distance [m] of the nearest."""
     pairs = instant(body, around, time)
     known = bounds_of(body, around, pairs, overlaps=True)
     row, distance = int(np.argmin(known.measured)), float(known.measured.min())
     held = overlapped(body, around, pairs.places)
     if held >= 0:
         row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
-    return NearestEdge(pairs, row, int(around.owners[pairs.edge[row]]), distance)
+    return pairs, row, int(around.owners[pairs.edge[row]]), distance
 
 
 def what_is_hit(
@@ -462,21 +432,11 @@ def what_is_hit(
 ) -> str:
     """A sentence on the obstacle that is nearest at a time since the start [s]."""
     pairs, row, index, distance = nearest_at(body, around, time)
-    point = _nearest_point(body, around, pairs, row) + complex(*origin)
-    name = name_of(obstacles[index], index, f"({point.real:.10g}, {point.imag:.10g})")
-    if distance <= CONTACT:
-        return f"at {body.clock + time:.6g} s the vehicle touches {name}"
-    near = f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"
-    return f"at {body.clock + time:.6g} s {near}"
-
-
-def _nearest_point(body: AuditedBody, around: Surroundings, pairs: EdgePairs, row: int) -> complex:
-    """The point of the edge of a pair that is nearest to the body."""
     assert pairs.frames is not None
     edge, frame, places = pairs.edge[row], pairs.frames[row, 0], pairs.places
     a, b = around.outline.begins[edge], around.outline.ends[edge]
-    there, turned = points_of(frame), directions(frame[2])
-    along = b - a
+    there, turned, along = points_of(frame), directions(frame[2]), b - a
+    # Of the edge: its ends, and where corners of the body are beside it.
     seen = (places.corners[0, :, 0] - there) * turned.conj()
     shares = ((seen - a) * along.conj()).real / max(float(np.abs(along)) ** 2, 1e-300)
     shares = np.concatenate([[0.0, 1.0], np.clip(shares, 0.0, 1.0)])
@@ -484,8 +444,12 @@ def _nearest_point(body: AuditedBody, around: Surroundings, pairs: EdgePairs, ro
     from_body = (world - places.place[0, 0]) * places.turn[0, 0].conj()
     own = body.outline.edges
     apart = np.sqrt(point_apart(from_body[:, None], own.begins, own.ends)) - own.radius
-    best = world[int(np.argmin(apart.min(axis=1)))]
-    return complex(np.round(best, 3)) + 0.0
+    point = complex(np.round(world[int(np.argmin(apart.min(axis=1)))], 3)) + 0.0 + complex(*origin)
+    name = name_of(obstacles[index], index, f"({point.real:.10g}, {point.imag:.10g})")
+    if distance <= CONTACT:
+        return f"at {body.clock + time:.6g} s the vehicle touches {name}"
+    near = f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"
+    return f"at {body.clock + time:.6g} s {near}"
 
 
 def zones_broken(
@@ -501,17 +465,22 @@ def zones_broken(
     spans, pieces = drive.between_samples()
     ends = np.concatenate([spans.begin, spans.end])
     twists = drive.twists_at(np.tile(spans.element, 2), ends)
+    names = [
+        {one.name} if isinstance(one, Trim) else {one.source, one.target}
+        for one in drive.plan.primitives
+    ]
     for zone in zones:
-        admitted = _admitted(zone, twists).reshape(2, -1).all(axis=0) & _named(drive, zone)[pieces]
+        admitted = _admitted(zone, twists).reshape(2, -1).all(axis=0)
+        named = [zone.trims is None or one <= set(zone.trims) for one in names]
+        admitted &= np.array(named)[pieces]
         around = surroundings_around((Obstacle(zone.shape),), origin)
         found = [
             least_clearance(body, around, run) for run in _runs(spans, ~admitted) for body in bodies
         ]
         least = min(found, key=lambda one: one.distance, default=NEVER)
         if not least.distance > CONTACT:
-            reasons.append(
-                f"at {least.time:.6g} s the vehicle moves as {zone.words} does not admit"
-            )
+            moves = f"the vehicle moves as {zone.words} does not admit"
+            reasons.append(f"at {least.time:.6g} s {moves}")
     return reasons
 
 
@@ -534,12 +503,3 @@ def _admitted(zone: Zone, twists: Array) -> NDArray[np.bool_]:
     if not zone.reverse:
         good &= twists[:, 0] >= -EXCEEDED
     return good
-
-
-def _named(drive: DrivenPlan, zone: Zone) -> NDArray[np.bool_]:
-    """Whether a zone admits each primitive by its names."""
-    names = [
-        {one.name} if isinstance(one, Trim) else {one.source, one.target}
-        for one in drive.plan.primitives
-    ]
-    return np.array([zone.trims is None or one <= set(zone.trims) for one in names])

@@ -170,12 +170,11 @@ def _cut_rings(corners: Array, holes: Sequence[Array]) -> list[Array]:
     ]
     if not parts:
         raise ValueError(f"polygon: got {len(corners)} corners around no area")
-    rings = [
-        shapely.get_coordinates(ring)[:-1]
+    return [
+        np.asarray(shapely.get_coordinates(ring)[:-1])
         for part in map(shapely.geometry.polygon.orient, parts)
         for ring in (part.exterior, *part.interiors)
     ]
-    return [np.asarray(ring) for ring in rings]
 
 
 def _faces(ring: Array) -> Any:
@@ -298,14 +297,6 @@ def origin_of(place: ArrayLike) -> tuple[float, float]:
     return x, y
 
 
-@functools.lru_cache(maxsize=8)
-def surroundings_of(
-    obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
-) -> Surroundings:
-    """As `surroundings_around`; those of the last maps are kept."""
-    return surroundings_around(obstacles, origin)
-
-
 def surroundings_around(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
 ) -> Surroundings:
@@ -357,6 +348,9 @@ def surroundings_around(
         index=_boxed(whole, still, heights_of),
         rounds=bool(whole.radius.any()),
     )
+
+
+surroundings_of = functools.lru_cache(maxsize=8)(surroundings_around)  # those of the last maps
 
 
 def _boxed(outline: Outline, still: IntArray, heights: Array) -> EdgeBoxes:

@@ -39,13 +39,10 @@ def spans_within(body: AuditedBody, first: float, last: float) -> Spans:
     frames, times = body.frames, body.frames.times
     lengths = times[1:] - times[:-1]
     steps = max(frames.length / LONGEST, body.outline.size, 1e-9)
-    count = np.ceil(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
-    count = np.maximum(count, 1.0).astype(np.int64)
-    element = np.repeat(np.arange(lengths.size), count)
-    number = np.arange(element.size) - (np.cumsum(count) - count)[element]
-    begin, end = number / count[element], (number + 1) / count[element]
+    every = Spans.evenly(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
     if first <= 0.0 and last >= times[-1]:
-        return Spans(element, begin, end)
+        return every
+    element, begin, end = every
     low, high = (np.clip((at - times[:-1]) / lengths, 0.0, 1.0) for at in (first, last))
     begin, end = np.maximum(begin, low[element]), np.minimum(end, high[element])
     kept = begin < end
@@ -155,13 +152,14 @@ def nearest_still_pairs(
     left out.
     """
     pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
-    boxes = _Boxes.around(places.corners)
+    boxes = _boxes(places.corners)
     # Those along the axes of the body as a stretch begins are closer to it.
-    own = _Boxes.around(np.asarray((places.corners - places.place[0]) * places.turn[0].conj()))
+    own = _boxes(np.asarray((places.corners - places.place[0]) * places.turn[0].conj()))
     within = FIRST_WITHIN * body.outline.size + SPARE
     while True:
-        span, edge = around.near(np.concatenate(boxes.grown(pad + within), axis=1))
-        kept = _meets(around, places, own.grown(pad + within), span, edge)
+        grown = (pad + within) * np.array([-1.0, -1.0, 1.0, 1.0])
+        span, edge = around.near(boxes + grown)
+        kept = _meets(around, places, own + grown, span, edge)
         pairs = EdgePairs(places, span[kept], edge[kept], None)
         if not pairs.edge.size:
             within *= FURTHER
@@ -190,26 +188,14 @@ def _nearest_pairs(body: AuditedBody, around: Surroundings, pairs: EdgePairs) ->
     return pairs.of(kept)
 
 
-class _Boxes(NamedTuple):
-    """Corners (s, 2) of boxes along the axes [m]."""
-
-    low: Array
-    high: Array
-
-    @classmethod
-    def around(cls, points: Points) -> _Boxes:
-        """Boxes around points (2, n, s)."""
-        x, y = (one.reshape(-1, points.shape[2]) for one in (points.real, points.imag))
-        low, high = (x.min(axis=0), y.min(axis=0)), (x.max(axis=0), y.max(axis=0))
-        return cls(np.stack(low, axis=1), np.stack(high, axis=1))
-
-    def grown(self, by: Array) -> _Boxes:
-        """The boxes, larger by a length (s, 1) [m] on every side."""
-        return _Boxes(self.low - by, self.high + by)
+def _boxes(points: Points) -> Array:
+    """Boxes (s, 4) [low x, low y, high x, high y] along the axes around points (2, n, s) [m]."""
+    x, y = (one.reshape(-1, points.shape[2]) for one in (points.real, points.imag))
+    return np.stack([x.min(axis=0), y.min(axis=0), x.max(axis=0), y.max(axis=0)], axis=1)
 
 
 def _meets(
-    around: Surroundings, places: SpanPlaces, boxes: _Boxes, span: IntArray, edge: IntArray
+    around: Surroundings, places: SpanPlaces, boxes: Array, span: IntArray, edge: IntArray
 ) -> NDArray[np.bool_]:
     """Whether the boxes around edges meet those of stretches, both along the body's axes.
 
@@ -218,11 +204,11 @@ def _meets(
     place, back = places.place[0, span], places.turn[0, span].conj()
     a = (around.outline.begins[edge] - place) * back
     b = (around.outline.ends[edge] - place) * back
-    low, high, radius = boxes.low[span], boxes.high[span], around.outline.radius[edge]
-    kept = np.maximum(a.real, b.real) + radius >= low[:, 0]
-    kept &= np.minimum(a.real, b.real) - radius <= high[:, 0]
-    kept &= np.maximum(a.imag, b.imag) + radius >= low[:, 1]
-    kept &= np.minimum(a.imag, b.imag) - radius <= high[:, 1]
+    (low_x, low_y, high_x, high_y), radius = boxes[span].T, around.outline.radius[edge]
+    kept = np.maximum(a.real, b.real) + radius >= low_x
+    kept &= np.minimum(a.real, b.real) - radius <= high_x
+    kept &= np.maximum(a.imag, b.imag) + radius >= low_y
+    kept &= np.minimum(a.imag, b.imag) - radius <= high_y
     if places.altitude is not None:
         kept |= np.isfinite(around.heights[edge]).all(axis=1)
     return np.asarray(kept)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.arrays import BodyOutline, Points, Spans
+from maneuver_automaton.audit.arrays import BodyOutline, Outline, Points, Spans
 from maneuver_automaton.audit.frames import FrameMotion
 from maneuver_automaton.audit.outlines import (
     Surroundings,
@@ -151,7 +151,7 @@ def bounds_of(
     off = _off(body, around, pairs, paths, np.abs(a))
     radius = None  # of what comes near (2 n, m) [m]; all have corners
     if around.rounds or body.outline.radius:
-        radii = np.concatenate([body.outline.edges.radius] * 2)
+        radii = np.concatenate([own.radius] * 2)
         radius = np.asarray(radii[:, None] + around.outline.radius[pairs.edge])
     near = _near(paths, sides, off, radius)
     doubtful = (near[0] <= 0.0) | overlaps
@@ -165,7 +165,7 @@ def bounds_of(
         ends = np.broadcast_to((end - place) * turn.conj(), place.shape)
         for k in (0, 1):
             at = paths[k, :n, rows], paths[k, n, rows], ends[k, rows]  # (rows, n) first
-            hit = rows[_overlap(body, around, pairs.edge[rows], *at)]
+            hit = rows[_overlap(own, around, pairs.edge[rows], *at)]
             near[2 + k, hit] = near[1, hit] = 0.0
     apart = np.maximum(near[1:], 0.0)
     if places.altitude is not None:
@@ -215,10 +215,9 @@ def _off(
         drift = np.hypot(change[:, 0], change[:, 1]) / lasting
         motion = around.motion_of_edge[pairs.edge]
         moves = (motion >= 0) & (lasts > 0.0)
-        drift = np.maximum(
-            drift, np.where(moves, np.append(around.movers.speeds, 0.0)[motion], 0.0)
-        )
-        bend = np.where(moves, np.append(around.movers.bends, 0.0)[motion], 0.0)
+        known = around.movers.speeds, around.movers.bends
+        arcs, bend = (np.where(moves, np.append(one, 0.0)[motion], 0.0) for one in known)
+        drift = np.maximum(drift, arcs)
         spin = np.abs(change[:, 2]) / lasting
         edge_speed = drift + spin * end_reach
     seen = np.abs(paths[:, n])
@@ -248,18 +247,12 @@ def _apart_in_height(body: AuditedBody, pairs: EdgePairs, heights: Array, altitu
 
 
 def _overlap(
-    body: AuditedBody,
-    around: Surroundings,
-    edge: IntArray,
-    corners: Points,
-    begin: Points,
-    end: Points,
+    own: Outline, around: Surroundings, edge: IntArray, corners: Points, begin: Points, end: Points
 ) -> NDArray[np.bool_]:
     """Whether a body and the solid of each edge (m,) overlap: they cross, or one holds the other.
 
     The body's `corners` (m, n) are seen from the obstacle, the ends of the edge from the body.
     """
-    own = body.outline.edges
     over = crossed(begin[:, None], end[:, None], own.begins, own.ends).any(axis=1)
     over |= own.holds(begin).any(axis=0)
     solids = around.outline.solid[edge]

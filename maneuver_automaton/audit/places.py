@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit._kernels_edges import distances
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
@@ -47,7 +47,15 @@ def price_again(
         shares = (spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES).ravel()
         element = np.repeat(spans.element, SHARES.size)
         if isinstance(cost, Clearance):
-            apart = [_distances(one, around, element, shares, cost.within) for one in bodies]
+            scene = around.outline, around.heights, around.index, cost.within
+            apart = []
+            for body in bodies:
+                low, high = body.height
+                levels = low + body.base, high + body.base
+                if not body.in_space and low == high == 0.0:
+                    levels = -math.inf, math.inf
+                moves = body.frames.series, element, shares, body.offset
+                apart.append(distances(body.outline, *moves, levels, *scene))
             near = 1.0 - np.minimum.reduce(apart) / cost.within
             found, paid = np.asarray(cost.weight * near * near), np.flatnonzero(near)
         else:
@@ -62,11 +70,7 @@ def price_again(
 
     if not lasting.size:
         return 0.0
-    parts = np.ceil(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
-    parts = np.maximum(parts, 1.0).astype(np.int64)
-    of = np.repeat(np.arange(parts.size), parts)
-    number = np.arange(of.size) - (np.cumsum(parts) - parts)[of]
-    spans = Spans(of, number / parts[of], (number + 1) / parts[of])
+    spans = Spans.evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
     done = 0.0
     for _ in range(MOST_ROUNDS):
         values = rates(spans)
@@ -85,17 +89,3 @@ def price_again(
             np.stack([middle, rest.end], axis=1).ravel(),
         )
     return done + float(fine.sum())
-
-
-def _distances(
-    body: AuditedBody, around: Surroundings, elements: IntArray, shares: Array, within: float
-) -> Array:
-    """Distances (n,) [m] of a body at shares of elements to what stands still, or `within`."""
-    low, high = body.height
-    levels = low + body.base, high + body.base
-    if not body.in_space and low == high == 0.0:
-        levels = -math.inf, math.inf
-    moves = body.frames.series, elements, shares, body.offset
-    edges = around.outline, around.heights, around.index
-    found: Array = distances(body.outline, *moves, levels, *edges, within)
-    return found

@@ -19,11 +19,7 @@ from maneuver_automaton._display import Drawn
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
 from maneuver_automaton.models.model import check_model
-from maneuver_automaton.models.speeds import (
-    is_too_sharp,
-    lateral_acceleration,
-    lateral_limit,
-)
+from maneuver_automaton.models.speeds import is_too_sharp, lateral_acceleration, lateral_limit
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
 from maneuver_automaton.primitives.closed_form import Pairs, has_limited_rates, quickest_maneuvers
 from maneuver_automaton.primitives.symmetry import maneuver_in_world, trim_in_world

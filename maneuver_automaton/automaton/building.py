@@ -367,10 +367,7 @@ def _solved(recipe: _Recipe, pair: Pair) -> Entry:
         none = np.zeros((0, len(nodes.model.control_names)))
         return Entry(key=key, interval=np.inf, control=none, reason=found.reason)
     return Entry(
-        key=key,
-        interval=found.inputs.interval,
-        control=found.inputs.control,
-        defect=found.defect,
+        key=key, interval=found.inputs.interval, control=found.inputs.control, defect=found.defect
     )
 
 
@@ -429,9 +426,4 @@ def _assembled(
 def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
-    return Maneuver.along(
-        course,
-        name=f"{pair[0]} to {pair[1]}",
-        source=pair[0],
-        target=pair[1],
-    )
+    return Maneuver.along(course, name=f"{pair[0]} to {pair[1]}", source=pair[0], target=pair[1])

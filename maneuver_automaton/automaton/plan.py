@@ -98,12 +98,7 @@ class Plan(Played):
 
     @classmethod
     def of_parts(
-        cls,
-        start: Array,
-        trims: tuple[Trim, ...],
-        durations: Sequence[float],
-        *,
-        start_time: float,
+        cls, start: Array, trims: tuple[Trim, ...], durations: Sequence[float], *, start_time: float
     ) -> Plan:
         """A plan of trims alone, from parts of another plan, which was checked when it was made.
 

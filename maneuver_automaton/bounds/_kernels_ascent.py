@@ -117,12 +117,7 @@ def lower_row(w: Single, by: int, to: int) -> None:
 
 
 @bare_inner_kernel
-def lower_nodes(
-    w: Single,
-    room: Single,
-    base: NDArray[np.int32],
-    nodes: Nodes,
-) -> None:
+def lower_nodes(w: Single, room: Single, base: NDArray[np.int32], nodes: Nodes) -> None:
     """The room of nodes becomes the lesser of itself and that in a block."""
     at, first, over_x, over_y = nodes
     row = np.uint64(LANES)

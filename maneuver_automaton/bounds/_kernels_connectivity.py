@@ -45,13 +45,7 @@ def ends_in(grid: Grid, ends: Array, bit: int, level: int, x: float, y: float, t
 
 @bare_inner_kernel
 def judge(
-    scene: PoseArrays,
-    grid: Grid,
-    cells: Cells,
-    cell: int,
-    starts: Array,
-    goals: Array,
-    give: float,
+    scene: PoseArrays, grid: Grid, cells: Cells, cell: int, starts: Array, goals: Array, give: float
 ) -> None:
     """Write the state of a new cell, and whether it holds an end."""
     level = cells.level[cell]

@@ -131,12 +131,7 @@ def scale(w: Single, first: int, last: int, factor: np.float32) -> None:
 
 
 @bare_inner_kernel
-def gather(
-    w: Single,
-    x: Single,
-    base: NDArray[np.int32],
-    nodes: Nodes,
-) -> None:
+def gather(w: Single, x: Single, base: NDArray[np.int32], nodes: Nodes) -> None:
     """Values at the corners of a block of cells, and their differences."""
     at, first, over_x, over_y = nodes
     row = np.uint64(LANES)
@@ -161,12 +156,7 @@ def gather(
 
 
 @bare_inner_kernel
-def scatter(
-    w: Single,
-    back: Single,
-    base: NDArray[np.int32],
-    nodes: Nodes,
-) -> None:
+def scatter(w: Single, back: Single, base: NDArray[np.int32], nodes: Nodes) -> None:
     """Add what the differences get back to the nodes."""
     at, first, over_x, over_y = nodes
     row = np.uint64(LANES)

@@ -238,8 +238,7 @@ def _tube(
     whole = cells.value_at(found, at)
     onward = np.maximum(_least(cells, columns, level.to_goal), _least(cells, columns, found))
     before = np.maximum(
-        _least(cells, columns, level.from_start),
-        _least(cells, columns, whole - found),
+        _least(cells, columns, level.from_start), _least(cells, columns, whole - found)
     )
     return (cells.active > 0) & (np.maximum(onward, 0.0) + np.maximum(before, 0.0) < limit)
 

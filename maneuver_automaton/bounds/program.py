@@ -207,12 +207,7 @@ def _rows(program: BoundProgram) -> Rows:
     table, rates = _directions(cells, families, 7)
     steps = 1.0 / np.maximum(program.weight * program.rate, 1e-30)
     table[:, 4:7, :-1] = steps[:, :, :-1]
-    return Rows(
-        table=table.reshape(-1),
-        turn=rates,
-        side=families.side,
-        gear=families.gear,
-    )
+    return Rows(table=table.reshape(-1), turn=rates, side=families.side, gear=families.gear)
 
 
 def _shares(cells: PoseCells, families: Families, size: Array, turn: Array, gears: int) -> Array:

@@ -453,11 +453,7 @@ def _box_of(scene: PoseScene, goal: Goal) -> Array:
 
 
 def _narrowest(
-    problem: Problem,
-    scene: PoseScene,
-    start: Array,
-    goals: Array,
-    deadline: float,
+    problem: Problem, scene: PoseScene, start: Array, goals: Array, deadline: float
 ) -> Narrowest | None:
     """The narrowest place: where obstacles must draw back so that there is a way."""
     low, high, path = 0.0, math.inf, np.zeros((0, 3))

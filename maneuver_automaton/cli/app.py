@@ -436,8 +436,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def every_command(
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Options before the name of a command."""

@@ -45,11 +45,7 @@ def check_file(file: Path, *, parts: Parts, leave: bool) -> int:
     problem = scenario.problem
     return reported(
         scenario.name,
-        [
-            *of_vehicle(problem),
-            *of_ends(problem),
-            _feasibility(problem, scenario.time_limit_s),
-        ],
+        [*of_vehicle(problem), *of_ends(problem), _feasibility(problem, scenario.time_limit_s)],
     )
 
 
@@ -283,9 +279,7 @@ def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
     ]
     if at_goals:
         there = FleetProblem(
-            [one for _, one in at_goals],
-            names=[name for name, _ in at_goals],
-            margin=fleet.margin,
+            [one for _, one in at_goals], names=[name for name, _ in at_goals], margin=fleet.margin
         )
         yield _apart("goals", there)
     limit = scenario.time_limit_s

@@ -87,9 +87,7 @@ def _plans(path: Path, document: Mapping[str, Any], fleet: FleetProblem) -> list
         _plan(f"{name}: plan", verdict.verdicts[name], stated[name].get("cost"))
         if name in verdict.verdicts
         else Finding(
-            what=f"{name}: plan",
-            holds=False,
-            words=_why_none(stated.get(name, {}).get("reason")),
+            what=f"{name}: plan", holds=False, words=_why_none(stated.get(name, {}).get("reason"))
         )
         for name in fleet.names
     ]

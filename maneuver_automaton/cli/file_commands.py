@@ -25,13 +25,7 @@ from maneuver_automaton._kernel_folders import (
 from maneuver_automaton._kernel_list import kernel_names
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
-from maneuver_automaton.cli.inputs import (
-    Parts,
-    automaton_of,
-    make_folder,
-    problem_of,
-    writing,
-)
+from maneuver_automaton.cli.inputs import Parts, automaton_of, make_folder, problem_of, writing
 from maneuver_automaton.cli.terminal import console, print_written, table
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario

@@ -29,10 +29,7 @@ class DispersedLibrary:
 
 
 def disperse_library(
-    library: Automaton,
-    *,
-    most: int,
-    metres_per_radian: float | None = None,
+    library: Automaton, *, most: int, metres_per_radian: float | None = None
 ) -> DispersedLibrary:
     """At most `most` maneuvers of a library, their ends spread as evenly as those of all.
 

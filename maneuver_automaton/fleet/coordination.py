@@ -38,14 +38,7 @@ from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import Meeting, meetings
-from maneuver_automaton.fleet.vehicle import (
-    AT_ONCE,
-    LONG,
-    QUICK,
-    FleetMember,
-    OwnPlan,
-    courses_of,
-)
+from maneuver_automaton.fleet.vehicle import AT_ONCE, LONG, QUICK, FleetMember, OwnPlan, courses_of
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.refinement.improve import WordSchedule
 

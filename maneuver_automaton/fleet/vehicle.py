@@ -22,11 +22,7 @@ from maneuver_automaton.collision.shapes import Disc, Obstacle
 from maneuver_automaton.fleet.courses import FleetCourse, levels_of, standing_still, where_it_stays
 from maneuver_automaton.fleet.meetings import PROOF
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.planning.blocked import (
-    blocked_ends,
-    goals_left,
-    why_goal_blocked,
-)
+from maneuver_automaton.planning.blocked import blocked_ends, goals_left, why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.plan import load, plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace

@@ -162,10 +162,7 @@ def automaton_of_aroc(
         course = ending_at(drive(model, [begin], control=control, durations=spans), end)
         maneuvers.append(
             Maneuver.along(
-                course,
-                name=Path(one.name).stem,
-                source=trims[begin].name,
-                target=trims[end].name,
+                course, name=Path(one.name).stem, source=trims[begin].name, target=trims[end].name
             )
         )
     return Automaton(model, tuple(trims.values()), tuple(maneuvers), name=name)

@@ -244,8 +244,7 @@ def commonroad_primitives_of_automaton(automaton: Automaton) -> RoadPrimitives:
         raise InvalidLibrary(f"{label}: has no maneuver; a file of {KIND} needs at least one")
     named = next((name for name, known in VEHICLES.items() if known == car), None)
     return RoadPrimitives(
-        primitives=tuple(_stated(car, maneuver) for maneuver in automaton.maneuvers),
-        vehicle=named,
+        primitives=tuple(_stated(car, maneuver) for maneuver in automaton.maneuvers), vehicle=named
     )
 
 

@@ -162,10 +162,7 @@ def _turns(root: Element) -> dict[int, str]:
 
 
 def _onward(
-    light: Element,
-    lanelet: Lanelet,
-    lanelets: Mapping[int, Lanelet],
-    turns: Mapping[int, str],
+    light: Element, lanelet: Lanelet, lanelets: Mapping[int, Lanelet], turns: Mapping[int, str]
 ) -> tuple[int, ...] | None:
     """The successors of a lanelet that a light is for; None if it is for all."""
     stated = light.get("direction")

@@ -73,8 +73,7 @@ class ClearanceEntry(TypedDict):
 
 
 SourceEntry = TypedDict(  # what a result was made from, as seen from its file
-    "SourceEntry",
-    {"file": str, "with": NotRequired[str | None], "case": NotRequired[Whole | None]},
+    "SourceEntry", {"file": str, "with": NotRequired[str | None], "case": NotRequired[Whole | None]}
 )
 
 
@@ -273,10 +272,7 @@ def document_of(form: type[T], value: Any, /, **given: Any) -> T:
 
 def library_entries(automaton: Automaton) -> dict[str, Any]:
     """The keys that name a vehicle and its library."""
-    return {
-        "vehicle": vehicle_entry(automaton.model),
-        "automaton_hash": automaton_hash(automaton),
-    }
+    return {"vehicle": vehicle_entry(automaton.model), "automaton_hash": automaton_hash(automaton)}
 
 
 def write_document(

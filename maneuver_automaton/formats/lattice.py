@@ -259,10 +259,7 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
                 for b in sorted(((a - 1) % n, (a + 1) % n))
             ]
     return Lattice(
-        resolution=resolution,
-        headings=headings,
-        moves=tuple(moves),
-        turning_radius=turning_radius,
+        resolution=resolution, headings=headings, moves=tuple(moves), turning_radius=turning_radius
     )
 
 

@@ -87,11 +87,7 @@ WRITTEN: Mapping[str, tuple[type, Callable[[Automaton], Any], Callable[[Any, Pat
         commonroad_primitives.commonroad_primitives_of_automaton,
         commonroad_primitives.save_commonroad_primitives,
     ),
-    NAV2_JSON: (
-        dict,
-        nav2_lattice.nav2_lattice_of_automaton,
-        nav2_lattice.save_nav2_lattice,
-    ),
+    NAV2_JSON: (dict, nav2_lattice.nav2_lattice_of_automaton, nav2_lattice.save_nav2_lattice),
 }
 
 

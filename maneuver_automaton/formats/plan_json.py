@@ -516,10 +516,7 @@ def _primitive(entry: Mapping[str, Any], course: Trajectory) -> Primitive:
             reduced_state=course.reduced_state[0],
         )
     return Maneuver.along(
-        course,
-        name=entry["name"],
-        source=entry["source"],
-        target=entry["target"],
+        course, name=entry["name"], source=entry["source"], target=entry["target"]
     )
 
 

@@ -26,13 +26,7 @@ from maneuver_automaton.formats.statement import (
     check_size,
     drawn_headings,
 )
-from maneuver_automaton.formats.text_source import (
-    MAX_MAP_BYTES,
-    finite,
-    lines_of,
-    read_text,
-    whole,
-)
+from maneuver_automaton.formats.text_source import MAX_MAP_BYTES, finite, lines_of, read_text, whole
 
 SIZE, CELL, GRID = "discretization(cells):", "cellsize(meters):", "environment:"
 METRES, CELLS = "(meters,rads):", "(cells):"
@@ -145,11 +139,7 @@ def _costs(path: Path, lines: list[str], begin: int, n: int) -> Array:
 
 
 def _end(
-    path: Path,
-    header: _Header,
-    numbers: Mapping[str, list[float]],
-    what: str,
-    cells: OccupancyMap,
+    path: Path, header: _Header, numbers: Mapping[str, list[float]], what: str, cells: OccupancyMap
 ) -> Array:
     if CELL in numbers:
         return np.array(numbers[f"{what}{METRES}"])

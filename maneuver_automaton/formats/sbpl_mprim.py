@@ -153,10 +153,7 @@ def read_mprim(path: Path) -> MprimFile:
             "numbers that differ"
         )
     return MprimFile(
-        resolution=resolution,
-        headings=headings,
-        min_turning_radius=radius,
-        primitives=primitives,
+        resolution=resolution, headings=headings, min_turning_radius=radius, primitives=primitives
     )
 
 

@@ -167,8 +167,6 @@ def rollout(
     span = (times[0], times[-1])
     solution = solve_ivp(rates, span, start, method="DOP853", t_eval=times, rtol=rtol, atol=atol)
     if not solution.success:
-        raise ValueError(
-            f"rollout: the solver stopped at {solution.t[-1]:.6g} s of {times[-1]:.6g} s: "
-            f"{solution.message}"
-        )
+        stopped = f"{solution.t[-1]:.6g} s of {times[-1]:.6g} s: {solution.message}"
+        raise ValueError(f"rollout: the solver stopped at {stopped}")
     return np.asarray(solution.y.T, dtype=np.float64)

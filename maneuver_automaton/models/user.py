@@ -108,11 +108,9 @@ class UserModel:
         z = as_array(f"{self.name}: reduced state", z, last=len(self.reduced_names))
         u = as_array(f"{self.name}: control", u, last=len(self.control_names))
         batch = np.broadcast_shapes(z.shape[:-1], u.shape[:-1])
-        if not (count := math.prod(batch)):
-            return np.empty((*batch, n))
-        both = ((np.broadcast_to(a, (*batch, a.shape[-1])), a.shape[-1]) for a in (z, u))
-        rows = (a.reshape(count, size) for a, size in both)
-        values = as_array(f"{self.name}: {what}", list(map(function, *rows)))
+        both = (np.broadcast_to(a, (*batch, a.shape[-1])) for a in (z, u))
+        rows = (a.reshape(math.prod(batch), a.shape[-1]) for a in both)
+        values = as_array(f"{self.name}: {what}", list(map(function, *rows)) or np.empty((0, n)))
         if values.shape[1:] != (n,):
             raise ValueError(f"{self.name}: {what} returned shape {values.shape[1:]}, need ({n},)")
         return values.reshape(*batch, n)

@@ -21,6 +21,7 @@ ComponentFunction = Callable[[Components, Components], Components]
 """``f(z, u)``, component by component, in Python's arithmetic and NumPy's functions."""
 
 
+_batch = functools.lru_cache(np.broadcast_shapes)  # which takes longer than most formulas
 AT_REST = "steering_at_rest"
 LIKE = {  # whose limits hold for a component that has none of its own
     "front_steering": "steering",
@@ -30,9 +31,6 @@ LIKE = {  # whose limits hold for a component that has none of its own
     "hitch_2": "hitch",
     "hitch_3": "hitch",
 }
-
-
-_batch = functools.lru_cache(np.broadcast_shapes)  # which takes longer than most formulas
 
 
 class Vehicle:

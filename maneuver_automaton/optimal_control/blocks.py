@@ -98,9 +98,11 @@ def _places(matrix: Any) -> tuple[IntArray, IntArray]:
 def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -> BlockProgram:
     """The program of `size` variables and so many parameters that blocks add up to."""
     x, p = casadi.MX.sym("x", size), casadi.MX.sym("p", given)
-    of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", _rows(blocks))
+    number = sum(one.kind.rows * one.number for one in blocks)
+    of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", number)
     price, rows, entries, curves = casadi.MX(0.0), [], [], []
-    first = 0
+    of_entries, of_curves = list[IntArray](), list[IntArray]()  # (2, n) row and column of each
+    limits, first = np.zeros((number, 2)), 0  # rows must be zero, or else not positive
     for one in blocks:
         kind, count = one.kind, one.number
         taken = casadi.reshape(x[one.variables.ravel("F").tolist()], kind.size, count)
@@ -115,10 +117,17 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
         rows.append(casadi.vec(kind.value.map(count)(taken, known)))
         entries.append(casadi.vec(kind.slope.map(count)(taken, known)))
         curves.append(casadi.vec(curve))
-        first += kind.rows * count
+        row, column = kind.jacobian
+        row = (first + kind.rows * np.arange(count)[:, None] + row).ravel()
+        of_entries.append(np.array([row, one.variables[column].ravel("F")]))
+        both = np.array([one.variables[place].ravel("F") for place in kind.hessian])
+        of_curves.append(np.sort(both, axis=0))  # of the upper triangle
+        last = first + kind.rows * count
+        limits[first:last, 0].reshape(count, kind.rows)[:, kind.zero :] = -np.inf
+        first = last
     g = casadi.vertcat(*rows)
-    jacobian = _matrix(casadi, casadi.vertcat(*entries), _jacobian_places(blocks), first, size)
-    hessian = _matrix(casadi, casadi.vertcat(*curves), _hessian_places(blocks), size, size)
+    jacobian = _matrix(casadi, entries, of_entries, first, size)
+    hessian = _matrix(casadi, curves, of_curves, size, size)
     named = ["x", "p"], ["g", "jac_g_x"]
     of = ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
     derivatives = {  # not the gradient: IPOPT got numbers of it that were none (CasADi 3.8.2)
@@ -127,51 +136,14 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
         "no_nlp_grad": True,  # nor are the multipliers of what is given asked for
         "calc_lam_p": False,
     }
-    return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, _limits(blocks))
-
-
-def _rows(blocks: Sequence[Blocks]) -> int:
-    return sum(one.kind.rows * one.number for one in blocks)
-
-
-def _limits(blocks: Sequence[Blocks]) -> Array:
-    """Limits (rows, 2): of the rows that must be zero, and of the others."""
-    limits = np.zeros((_rows(blocks), 2))
-    first = 0
-    for one in blocks:
-        last = first + one.kind.rows * one.number
-        limits[first:last, 0].reshape(one.number, one.kind.rows)[:, one.kind.zero :] = -np.inf
-        first = last
-    return limits
-
-
-def _jacobian_places(blocks: Sequence[Blocks]) -> tuple[IntArray, IntArray]:
-    rows, columns = [], []
-    first = 0
-    for one in blocks:
-        row, variable = one.kind.jacobian
-        begins = first + one.kind.rows * np.arange(one.number)
-        rows.append((begins[:, None] + row).ravel())
-        columns.append(one.variables[variable].ravel("F"))
-        first += one.kind.rows * one.number
-    return np.concatenate(rows), np.concatenate(columns)
-
-
-def _hessian_places(blocks: Sequence[Blocks]) -> tuple[IntArray, IntArray]:
-    """Both variables of each entry, the smaller number first."""
-    rows, columns = [], []
-    for one in blocks:
-        row, column = (one.variables[place].ravel("F") for place in one.kind.hessian)
-        rows.append(np.minimum(row, column))
-        columns.append(np.maximum(row, column))
-    return np.concatenate(rows), np.concatenate(columns)
+    return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, limits)
 
 
 def _matrix(
-    casadi: Any, entries: Any, places: tuple[IntArray, IntArray], rows: int, columns: int
+    casadi: Any, parts: Sequence[Any], places: Sequence[IntArray], rows: int, columns: int
 ) -> Any:
-    """The sparse matrix that entries at some places add up to."""
-    row, column = places
+    """The sparse matrix that entries at some places (2, n), row and column, add up to."""
+    entries, (row, column) = casadi.vertcat(*parts), np.concatenate(places, axis=1)
     keys, owner = np.unique(column * rows + row, return_inverse=True)
     begins = (
         np.searchsorted(keys // rows, np.arange(columns + 1))

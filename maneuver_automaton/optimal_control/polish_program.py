@@ -57,17 +57,10 @@ def paths(
 ) -> list[Paths]:
     """Control points of every solid's corners in every interval, in symbols.
 
+    `begin`, `end`: of each interval, with its control. `step` (1, n - 1): its duration [s].
+
     Source: Farin (2002), *Curves and Surfaces for CAGD*, Sec. 7.5 (cubic Hermite interpolation in
     Bernstein form).
-
-    Parameters
-    ----------
-    casadi : module
-    parts : sequence of BodyPart
-    begin, end : NodeMotion
-        At the begin and at the end of each interval, with the control of the interval.
-    step : (1, n - 1) symbols
-        Duration of each interval [s].
     """
     found = []
     for part in parts:
@@ -97,21 +90,13 @@ def _corners(casadi: Any, part: BodyPart, corners: Array, at: NodeMotion) -> tup
         y = every @ p_y + along @ casadi.sin(turn) + aside @ casadi.cos(turn)
         v = casadi.jtimes(x, at.reduced, at.reduced_rates)
         w = casadi.jtimes(y, at.reduced, at.reduced_rates)
-    ahead, sideways, turning = (
-        casadi.repmat(casadi.SX(at.twist[k]) * ones, len(corners), 1) for k in range(3)
-    )
+    heading, twist = at.pose[2, :], [casadi.SX(v) * ones for v in at.twist[:3]]
+    rows = [*twist, casadi.cos(heading), casadi.sin(heading), at.pose[0, :], at.pose[1, :]]
+    every = [casadi.repmat(row, len(corners), 1) for row in rows]
+    ahead, sideways, turning, cosine, sine, p_x, p_y = every
     v, w = ahead - turning * y + v, sideways + turning * x + w
-    cosine, sine, p_x, p_y = (
-        casadi.repmat(row, len(corners), 1)
-        for row in (casadi.cos(at.pose[2, :]), casadi.sin(at.pose[2, :]), at.pose[0, :],
-                    at.pose[1, :])
-    )  # fmt: skip
-    return (
-        p_x + cosine * x - sine * y,
-        p_y + sine * x + cosine * y,
-        cosine * v - sine * w,
-        sine * v + cosine * w,
-    )
+    places = p_x + cosine * x - sine * y, p_y + sine * x + cosine * y
+    return *places, cosine * v - sine * w, sine * v + cosine * w
 
 
 POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone

@@ -186,11 +186,7 @@ def _corners(program: PolishProgram, point: Point, parting: Parting) -> tuple[Ar
 
 
 def _line_blocks(
-    program: PolishProgram,
-    parting: Parting,
-    places: CornerPlaces,
-    fixed: bool,
-    elastic: bool,
+    program: PolishProgram, parting: Parting, places: CornerPlaces, fixed: bool, elastic: bool
 ) -> list[Blocks]:
     """How far corners of the body, and of the pieces, reach over the lines."""
     pairs, own = parting.pairs, parting.own

@@ -238,31 +238,18 @@ def increments(rule: Rule, field: Field, *, state: Any, control: Any, step: Any)
     Source: Betts (2010), *Practical Methods for Optimal Control*, Sec. 3.4 (trapezoidal), Sec. 3.5
     (Runge-Kutta).
 
-    `rule`: controls at the n nodes (n_u, n), or constant over the n - 1 intervals (n_u, n - 1).
-    `field`: the rates. `state`: states at the nodes. `control`: see `rule`. `step`: time between
-    nodes [s].
+    `state`: at the n nodes. `control`: there too (n_u, n), or constant over the n - 1 intervals
+    (n_u, n - 1), as the rule has it.
     """
-    return _RULES[rule](field, state, control, step)
-
-
-def _trapezoidal(field: Field, state: Any, control: Any, step: Any) -> Any:
-    rates = field(state, control)
-    return (step / 2.0) * (rates[:, :-1] + rates[:, 1:])
-
-
-def _rk4(field: Field, state: Any, control: Any, step: Any) -> Any:
+    if rule == "trapezoidal":
+        rates = field(state, control)
+        return (step / 2.0) * (rates[:, :-1] + rates[:, 1:])
     n_states, begin = state.shape[0], state[:, :-1]
     k_1 = field(begin, control)
     k_2 = field(begin + (step / 2.0) * k_1[:n_states, :], control)
     k_3 = field(begin + (step / 2.0) * k_2[:n_states, :], control)
     k_4 = field(begin + step * k_3[:n_states, :], control)
     return (step / 6.0) * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
-
-
-_RULES: Mapping[Rule, Callable[[Field, Any, Any, Any], Any]] = {
-    "trapezoidal": _trapezoidal,
-    "rk4": _rk4,
-}
 
 
 def moving_frame(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.optimal_control.polish_program import PolishProgram
-from maneuver_automaton.optimal_control.scene import Point, Solid
+from maneuver_automaton.optimal_control.scene import ALWAYS, Point, Solid
 
 TOUCHING = 1e-6  # [m] nearer solids have no direction between them
 SHARED = 0.1  # share of the distance by which a piece may stand out before the line of another one
@@ -67,30 +67,24 @@ class Lines(NamedTuple):
         return Lines(self.angle, self.anchor + offset[:, None] * self.normal)
 
 
-def near_pairs(
-    points: Sequence[tuple[Array, Array]],
-    body: Sequence[Solid],
-    pieces: Sequence[Solid],
-    *,
-    within: float,
-    during: IntArray | None = None,
-) -> SolidPairs:
-    """Pairs that are nearer than `within` [m], from control points in numbers.
-
-    `during` is the interval in which alone each piece counts; -1 for all, -2 for none.
-    """
+def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPairs:
+    """Pairs that are nearer than `within` [m] at a point, from control points in numbers."""
     import shapely
 
-    solid = _geometries([corners for corners, _ in pieces])
-    rounding = np.array([by for _, by in pieces])
+    pieces, body = program.pieces(point), program.scene.body
+    if not (pieces.solids and body):
+        empty = np.zeros(0, dtype=np.int64)
+        return SolidPairs(empty, empty, empty)
+    solid = _geometries([corners for corners, _ in pieces.solids])
+    rounding = np.array([by for _, by in pieces.solids])
     tree = shapely.STRtree(solid)
     intervals, bodies, found = [], [], []
-    for k, ((x, y), (_, by)) in enumerate(zip(points, body, strict=True)):
+    for k, ((x, y), (_, by)) in enumerate(zip(program.points(point), body, strict=True)):
         hulls = _hulls(x, y)
         most = within + by + float(rounding.max(initial=0.0))
         interval, piece = tree.query(hulls, predicate="dwithin", distance=most)
-        if during is not None:
-            there = (during[piece] == -1) | (during[piece] == interval)
+        if pieces.move:
+            there = (pieces.interval[piece] == ALWAYS) | (pieces.interval[piece] == interval)
             interval, piece = interval[there], piece[there]
         apart = shapely.distance(hulls[interval], solid[piece]) - by - rounding[piece]
         close = apart < within
@@ -102,20 +96,16 @@ def near_pairs(
     )
 
 
-def first_lines(
-    points: Sequence[tuple[Array, Array]],
-    body: Sequence[Solid],
-    pieces: Sequence[Solid],
-    pairs: SolidPairs,
-) -> Lines:
+def first_lines(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
     """Lines between nearest points; where two solids overlap, along their least penetration."""
     import shapely
 
     if not len(pairs.piece):
         return Lines(np.zeros(0), np.zeros((0, 2)))
+    pieces = program.pieces(point).solids
     used, owner = np.unique(pairs.piece, return_inverse=True)
     solid = _geometries([pieces[k][0] for k in used.tolist()])
-    hulls = [_hulls(x, y) for x, y in points]
+    hulls = [_hulls(x, y) for x, y in program.points(point)]
     mine = np.array([hulls[b][k] for k, b in zip(pairs.interval, pairs.body, strict=True)],
                     dtype=object)  # fmt: skip
     ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[owner]))
@@ -376,7 +366,7 @@ class Parting(NamedTuple):
         which = np.flatnonzero(before & (reach.piece - reach.between < tight))
         if not len(which):
             return self
-        own = _first(program, point, SolidPairs(*(column[which] for column in self.pairs)))
+        own = first_lines(program, point, SolidPairs(*(one[which] for one in self.pairs)))
         lines = Lines(self.lines.angle.copy(), self.lines.anchor.copy())
         lines.angle[which], lines.anchor[which] = own
         owner = self.owner.copy()
@@ -402,17 +392,13 @@ class Parting(NamedTuple):
 
 def parted(program: PolishProgram, point: Point, pairs: SolidPairs) -> Parting:
     """Pairs with first lines at a point, of which pieces behind one another share one."""
-    lines = _first(program, point, pairs)
+    lines = first_lines(program, point, pairs)
     points, both = program.points(point), _both(program, point)
     reach = reaches(points, both, pairs, lines)
     owner = shared_lines(both[1], pairs, lines, reach)
     lines = lines.of(owner)
     faces = facing(points, both, pairs, lines, owner, turned=TURNED)
     return Parting(pairs, owner, lines, np.zeros(len(owner)), faces)
-
-
-def _first(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
-    return first_lines(program.points(point), *_both(program, point), pairs)
 
 
 def _both(program: PolishProgram, point: Point) -> tuple[list[Solid], list[Solid]]:
@@ -439,15 +425,3 @@ def held_near(program: PolishProgram, point: Point, within: float) -> list[IntAr
         near = np.minimum(room[:-1], room[1:]) < within + FURTHER * steps
         found.append(np.flatnonzero(near))
     return found
-
-
-def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPairs:
-    """Pairs nearer than `within` [m] at a point; see `near_pairs`."""
-    scene, pieces = program.scene, program.pieces(point)
-    if not (pieces.solids and scene.parts):
-        empty = np.zeros(0, dtype=np.int64)
-        return SolidPairs(empty, empty, empty)
-    during = pieces.interval if pieces.move else None
-    return near_pairs(
-        program.points(point), scene.body, pieces.solids, within=within, during=during
-    )

@@ -259,13 +259,11 @@ def solve(
     program = transcribe(problem, grid)
     functions = {"x": program.variables, "f": program.objective, "g": program.constraints}
     solver = casadi.nlpsol("solver", "ipopt", functions, ipopt_options(settings))
-    first = np.concatenate(
-        [
-            resampled(guess.state, grid.n_nodes).ravel(),
-            resampled(guess.control, grid.n_controls).ravel(),
-            [guess.duration],
-        ]
+    states, controls = (
+        resampled(rows, count).ravel()
+        for rows, count in ((guess.state, grid.n_nodes), (guess.control, grid.n_controls))
     )
+    first = np.concatenate([states, controls, [guess.duration]])
     built = time.perf_counter()
     answer = solver(
         x0=np.clip(first, *program.bounds.T),
@@ -274,13 +272,32 @@ def solve(
         lbg=program.limits[:, 0],
         ubg=program.limits[:, 1],
     )
-    solved = time.perf_counter()
-    return _solution(
-        program,
-        settings,
-        np.asarray(answer["x"].full(), dtype=np.float64).ravel(),
-        stats=solver.stats(),
-        seconds=(built - began, solved - built),
+    solved, stats = time.perf_counter(), solver.stats()
+    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    state, control, duration = unpacked(problem, grid, values)
+    checked = evaluate(problem, grid, state=state, control=control, duration=duration)
+    reason = str(stats["return_status"])
+    status = STATUS.get(reason, SolveStatus.FAILED)
+    worst = max(checked.worst_defect, checked.worst_violation)
+    if status is SolveStatus.SOLVED and not worst <= settings.admitted_defect:
+        status = SolveStatus.FAILED
+        reason = (
+            f"{reason}, but the numbers do not hold: defect {checked.worst_defect:.3g}, violation "
+            f"{checked.worst_violation:.3g}, admitted {settings.admitted_defect:.3g}"
+        )
+    return OptimalControlSolution(
+        status=status,
+        reason=reason,
+        time=np.linspace(0.0, duration, grid.n_nodes),
+        state=state,
+        control=control,
+        cost=checked.cost,
+        integrals=checked.integrals,
+        iterations=int(stats["iter_count"]),
+        build_s=built - began,
+        solve_s=solved - built,
+        worst_defect=checked.worst_defect,
+        worst_violation=checked.worst_violation,
     )
 
 
@@ -308,12 +325,9 @@ def bounds_of(problem: OptimalControlProblem, grid: TimeGrid) -> Array:
         for k, value in enumerate(values):
             if value is not None:
                 states[row, k] = value
-    controls = np.tile(
-        limits_of(problem.control_limits, problem.n_controls), (grid.n_controls, 1, 1)
-    )
-    return np.concatenate(
-        [states.reshape(-1, 2), controls.reshape(-1, 2), np.array([problem.duration])]
-    )
+    limits = limits_of(problem.control_limits, problem.n_controls)
+    controls = np.tile(limits, (grid.n_controls, 1))
+    return np.concatenate([states.reshape(-1, 2), controls, np.array([problem.duration])])
 
 
 def _check_guess(problem: OptimalControlProblem, guess: Guess) -> None:
@@ -326,39 +340,3 @@ def _check_guess(problem: OptimalControlProblem, guess: Guess) -> None:
             raise ValueError(
                 f"guess: {what} has {rows.shape[1]} columns, need {len(names)} ({', '.join(names)})"
             )
-
-
-def _solution(
-    program: Transcription,
-    settings: SolverSettings,
-    values: Array,
-    *,
-    stats: Mapping[str, Any],
-    seconds: tuple[float, float],
-) -> OptimalControlSolution:
-    problem, grid = program.problem, program.grid
-    state, control, duration = unpacked(problem, grid, values)
-    checked = evaluate(problem, grid, state=state, control=control, duration=duration)
-    reason = str(stats["return_status"])
-    status = STATUS.get(reason, SolveStatus.FAILED)
-    worst = max(checked.worst_defect, checked.worst_violation)
-    if status is SolveStatus.SOLVED and not worst <= settings.admitted_defect:
-        status = SolveStatus.FAILED
-        reason = (
-            f"{reason}, but the numbers do not hold: defect {checked.worst_defect:.3g}, violation "
-            f"{checked.worst_violation:.3g}, admitted {settings.admitted_defect:.3g}"
-        )
-    return OptimalControlSolution(
-        status=status,
-        reason=reason,
-        time=np.linspace(0.0, duration, grid.n_nodes),
-        state=state,
-        control=control,
-        cost=checked.cost,
-        integrals=checked.integrals,
-        iterations=int(stats["iter_count"]),
-        build_s=seconds[0],
-        solve_s=seconds[1],
-        worst_defect=checked.worst_defect,
-        worst_violation=checked.worst_violation,
-    )

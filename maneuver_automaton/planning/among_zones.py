@@ -158,10 +158,7 @@ def _questions(problem: Problem) -> Iterator[Problem]:
         if any(name is not None and name not in automaton for name in named):
             continue
         yield replace(
-            problem,
-            automaton=automaton,
-            zones=(),
-            obstacles=(*problem.obstacles, *avoided),
+            problem, automaton=automaton, zones=(), obstacles=(*problem.obstacles, *avoided)
         )
 
 

@@ -172,9 +172,7 @@ def goals_off_lattice(problem: Problem) -> PlanResult | None:
         return None
     many = f"every goal lies beside the lattice; the first: {reasons[0]}"
     return PlanResult(
-        problem=problem,
-        status=PlanStatus.NO_PLAN,
-        reason=reasons[0] if len(reasons) == 1 else many,
+        problem=problem, status=PlanStatus.NO_PLAN, reason=reasons[0] if len(reasons) == 1 else many
     )
 
 

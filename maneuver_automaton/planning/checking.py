@@ -98,19 +98,18 @@ def check_plan(
         reason = reason or what_passes_later(problem, plan)
         if reason:
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
-        _ask(budget, _audit_takes(problem, plan))
+        # About how long the audit takes: one that is begun late would be given up.
+        courses = [m.course for m in plan.maneuvers if m is not None and m.course is not None]
+        samples = sum(len(course.time) for course in courses) if problem.obstacles else 0
+        _ask(budget, AUDIT_S + SAMPLE_S * samples * (1 + len(problem.parts)))
         prices = problem.place_prices_of(plan) if problem.place_costs else ()
         refused = min((one.refused for one in prices if one.refused is not None), default=None)
         if refused is not None:
             reason = f"at {refused:.6g} s it is where a place cost does not allow it"
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
-        places = StatedPrices(
-            costs=tuple(  # the audit has distances of its own
-                stated if isinstance(stated, Clearance) else known
-                for stated, known in zip(
-                    problem.place_costs, problem.bound_place_costs, strict=True
-                )
-            ),
+        both = zip(problem.place_costs, problem.bound_place_costs, strict=True)
+        places = StatedPrices(  # the audit has distances of its own
+            costs=tuple(one if isinstance(one, Clearance) else known for one, known in both),
             prices=tuple(one.price for one in prices),
             whole=problem.cost_of(plan) if prices else 0.0,
         )
@@ -170,15 +169,6 @@ def _ask(budget: Budget, needed: float = 0.0) -> None:
     """Go on only if more than the time needed [s] is left."""
     if budget.left_to_check <= needed:
         raise TooLate
-
-
-def _audit_takes(problem: Problem, plan: Plan) -> float:
-    """About how long an audit takes [s]: one that is begun late would be given up."""
-    if not problem.obstacles:
-        return AUDIT_S
-    courses = [m.course for m in plan.maneuvers if m is not None and m.course is not None]
-    samples = sum(len(course.time) for course in courses)
-    return AUDIT_S + SAMPLE_S * samples * (1 + len(problem.parts))
 
 
 def load_checks(problem: Problem, workspace: Workspace) -> None:

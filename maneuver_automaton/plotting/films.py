@@ -22,11 +22,7 @@ from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.plotting.obstacles import (
-    MOVING,
-    moving_shapes,
-    show_presence,
-)
+from maneuver_automaton.plotting.obstacles import MOVING, moving_shapes, show_presence
 from maneuver_automaton.plotting.pages import DPI, EDGE, page_of, settled
 from maneuver_automaton.plotting.paths import (
     DART,

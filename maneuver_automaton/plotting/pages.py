@@ -79,12 +79,7 @@ class Page:
 
 
 def page_of(
-    look: Look,
-    lines: Sequence[str],
-    legend: Entries,
-    *,
-    shape: float,
-    panels: Sequence[float] = (),
+    look: Look, lines: Sequence[str], legend: Entries, *, shape: float, panels: Sequence[float] = ()
 ) -> Page:
     """A page with a heading of some lines, a legend along its lower edge, a plane, and panels.
 
@@ -132,13 +127,7 @@ def page_of(
     return Page(figure, axes["plane"], over_time, is_stacked=not flat or columns == 1)
 
 
-def space_page(
-    look: Look,
-    lines: Sequence[str],
-    legend: Entries,
-    *,
-    shape: float,
-) -> Page:
+def space_page(look: Look, lines: Sequence[str], legend: Entries, *, shape: float) -> Page:
     """A page with axes in space above two of the plane, each `shape` times as wide as high."""
     figure, top, foot = _framed(look, lines, legend)
     below = min(max(0.45 * look.width / shape, 1.5 * LEAST_PLANE), 0.5 * HIGH)

@@ -194,10 +194,7 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
     if loop:
         artists |= _steps_of(ax, cast, one)
     else:
-        artists |= {
-            "darts": _darts(one, size=size),
-            "bodies": _switch_bodies(one),
-        }
+        artists |= {"darts": _darts(one, size=size), "bodies": _switch_bodies(one)}
         poses = _between_ends(one, apart=1e-6 * size)[: None if one.body else 0]
         artists["switches"] = ax.scatter(
             poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK],

@@ -63,11 +63,7 @@ def bang_bang(model: Model, source: Trim, target: Trim, *, late: bool = False) -
 
 
 def connect_bang_bang(
-    model: Model,
-    trims: Sequence[Trim],
-    *,
-    pairs: Pairs = "all",
-    late: bool = False,
+    model: Model, trims: Sequence[Trim], *, pairs: Pairs = "all", late: bool = False
 ) -> tuple[Maneuver, ...]:
     """Quickest maneuvers between trims of different reduced states; see `bang_bang`.
 
@@ -331,10 +327,7 @@ def _swing(model: Model, rest: Trim, length: float, component: str) -> Ramp:
     moving[k] = most
     pace = min(1.0, pace_within(model, model.body_velocity(moving, rest.control)))
     return ramp_of(
-        length,
-        max_speed=float(most) * pace,
-        acceleration=float(up),
-        deceleration=float(down),
+        length, max_speed=float(most) * pace, acceleration=float(up), deceleration=float(down)
     )
 
 
@@ -375,10 +368,7 @@ def from_rest(
         rates = [ramp.peak / ramp.speed_up, 0.0, -ramp.peak / ramp.brake]
         row[:, driven.index(component)] = rates
     courses = drive_all(
-        model,
-        [rest.reduced_state for rest, _ in asked],
-        control=control,
-        durations=durations,
+        model, [rest.reduced_state for rest, _ in asked], control=control, durations=durations
     )
     return tuple(
         Maneuver.along(

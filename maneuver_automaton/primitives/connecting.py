@@ -190,10 +190,7 @@ def _checked(
     if is_too_sharp(model, course.twists(model)).any():
         return replace(nothing, reason="it leaves the lateral acceleration of the vehicle")
     maneuver = Maneuver.along(
-        course,
-        name=f"{source.name} to {target.name}",
-        source=source.name,
-        target=target.name,
+        course, name=f"{source.name} to {target.name}", source=source.name, target=target.name
     )
     defect = maneuver_defect(model, maneuver, source=source, target=target)
     if not defect <= ADMITTED_DEFECT:

@@ -47,10 +47,7 @@ class FoundTrims:
 
 
 def trims_of(
-    model: Model,
-    grid: Mapping[str, ArrayLike],
-    *,
-    max_lateral_acceleration: float | None = None,
+    model: Model, grid: Mapping[str, ArrayLike], *, max_lateral_acceleration: float | None = None
 ) -> FoundTrims:
     """Trims of a model at every combination of the values in `grid`, within its limits.
 

@@ -208,12 +208,8 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
             if (missed := float(np.abs(off).max())) <= CLOSED:
                 break
             aim = aim - off
-        if (
-            not missed <= CLOSED
-            or beyond_limits(model.reduced_limits, course.reduced_state).max() > WITHIN
-        ):
-            continue
-        if is_too_sharp(model, course.twists(model)).any():
+        over = beyond_limits(model.reduced_limits, course.reduced_state).max()
+        if not missed <= CLOSED or over > WITHIN or is_too_sharp(model, course.twists(model)).any():
             continue
         name = f"{source.name} to {target.name}"
         made = Maneuver.along(course, name=name, source=source.name, target=target.name)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.models import CarWithTrailer, Model, OnlyTranslated
@@ -97,18 +96,11 @@ def _chosen(
         for here, there in sorted(steps):
             if abs(math.remainder(headings[a] - here, 2.0 * math.pi)) > HEADING_TOLERANCE:
                 continue
-            b = _match(trims, np.abs(wrapped(headings - there)) <= HEADING_TOLERANCE, trim, rate)
-            yield from ((a, b, turn) for turn in _turns(here, there))
-
-
-def _match(trims: Sequence[Trim], there: NDArray[np.bool_], source: Trim, rate: int) -> int:
-    """The trim among those `there` whose other controls are those of the source, or the first."""
-    candidates = np.flatnonzero(there).tolist()
-    kept = np.arange(source.control.size) != rate
-    for k in candidates:
-        if (trims[k].control[kept] == source.control[kept]).all():
-            return int(k)
-    return int(candidates[0])
+            found = np.flatnonzero(np.abs(wrapped(headings - there)) <= HEADING_TOLERANCE).tolist()
+            changes = (np.flatnonzero(trims[k].control != trim.control).tolist() for k in found)
+            # The one whose other controls are those of the source, or else the first.
+            kept = [k for k, which in zip(found, changes, strict=True) if set(which) <= {rate}]
+            yield from ((a, (kept or found)[0], turn) for turn in _turns(here, there))
 
 
 def _distinct(headings: Array) -> list[float]:

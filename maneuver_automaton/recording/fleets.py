@@ -10,12 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.fleet import (
-    DrivenVerdict,
-    FleetLog,
-    FleetResult,
-    verify_driven,
-)
+from maneuver_automaton.fleet import DrivenVerdict, FleetLog, FleetResult, verify_driven
 from maneuver_automaton.fleet.driven import whole_pieces
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.primitives import Trim

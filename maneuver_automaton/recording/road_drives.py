@@ -196,9 +196,7 @@ def _of_all(result: RoadFleetResult | RoadFleetDrive, plans: Sequence[Plan]) -> 
     return facts
 
 
-def tables(
-    result: RoadPlanResult | RoadDrive | RoadFleetResult | RoadFleetDrive,
-) -> list[Table]:
+def tables(result: RoadPlanResult | RoadDrive | RoadFleetResult | RoadFleetDrive) -> list[Table]:
     """Every vehicle of several; nothing of one."""
     if isinstance(result, RoadPlanResult | RoadDrive):
         return []

@@ -252,10 +252,7 @@ def via_pose(
 
 @bare_inner_kernel
 def via_middle(
-    one: Improving,
-    section: Section,
-    via: tuple[float, float, float, float],
-    there: tuple[int, int],
+    one: Improving, section: Section, via: tuple[float, float, float, float], there: tuple[int, int]
 ) -> int:
     """Write into the new middle a connection to the pose `via`, and one from there on."""
     lib, task, word = one.library, one.task, one.word

@@ -12,24 +12,18 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.words import TimesStatus, solve_switching_times
-from maneuver_automaton.words.closing import (
-    EndConditions,
-    closest_times,
-    conjugated,
-    times_through,
-)
+from maneuver_automaton.words.closing import EndConditions, closest_times, conjugated, times_through
 
 TIME_TOLERANCE = 1e-9  # [s] by which a time may miss a limit, and as a share of the limit
 NO_TIME = 0.0  # [s] a trim that lasts no longer is not one of the word
@@ -159,94 +153,59 @@ def _passed(start: Array, goal: Goal, trim: Trim) -> Iterator[Array]:
             yield np.array([*goal.pose[:2], start[2] + turn, *goal.pose[3:]])
 
 
-class _Pairs(NamedTuple):
-    """Two trims each, one after the other, (n,); of both (2, n) what is known without a goal."""
-
-    first: IntArray
-    second: IntArray
-    v: Complexes  # [m/s]
-    w: Array  # [rad/s]
-    r: Complexes  # from the centre of a turn to the pose [m]
-    turns: NDArray[np.bool_]
-
-    def of(self, rows: IntArray) -> _Pairs:
-        """Some of them, by number."""
-        return _Pairs._make(one[..., rows] for one in self)
-
-    def aside(self, z: complex, heading: float) -> Array:
-        """How far (n,) [m, rad] what `ended` says stays aside is, without its directions."""
-        (r, r_2), (turns, turns_2), last = self.r, self.turns, cmath.rect(1.0, heading)
-        left = (z + r) - r_2 * last  # of two turns: from the first centre to the second
-        both = np.abs(np.abs(left) - np.abs(r - r_2))
-        ahead = np.where(turns, last, 1.0)
-        left -= (r - r_2) * ahead
-        straight = np.where(turns_2, self.v[0], self.v[1] * ahead)
-        with np.errstate(invalid="ignore"):  # what only climbs goes nowhere
-            one = np.abs((left * straight.conj()).imag) / np.abs(straight)
-        found = np.where(turns & turns_2, both, one)
-        return np.where(turns | turns_2, found, abs(math.remainder(heading, math.tau)))
-
-    def ended(self, z: complex, h: Array) -> tuple[Array, Complexes, Complexes]:
-        """Of words that end heading `h`: heading at the switch, what is left, what stays aside."""
-        (r, r_2), (turns, turns_2), last = self.r, self.turns, np.exp(1j * h)
-        centres = np.angle((z + r - r_2 * last) / (r - r_2))  # of two turns decide
-        between = np.where(turns_2 & (r != r_2), centres, h) * turns
-        switch = np.exp(1j * between)
-        left = z - r * (switch - 1.0) - r_2 * (last - switch)  # for straights to cover
-        straight = np.where(turns_2, self.v[0], self.v[1] * switch)
-        aside = 1j * (left / straight).imag * straight
-        return between, left, np.where(turns & turns_2, left, aside)
-
-
-@kept_by_first
-def _pairs(_owner: Automaton, trims: tuple[Trim, ...]) -> _Pairs:
-    """All pairs of some trims."""
-    first, second = np.indices((len(trims), len(trims))).reshape(2, -1)
-    x, y, w = np.array([trim.body_velocity[:3] for trim in trims]).reshape(-1, 3).T
-    v, turns = x + 1j * y, w != 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        r = np.where(turns, -1j * v / w, 0.0)
-    both = np.array([first, second])
-    return _Pairs(first, second, v[both], w[both], r[both], turns[both])
-
-
 def _short_words(
     problem: Problem, goal: Array, trims: tuple[Trim, ...]
 ) -> Iterator[tuple[list[Trim], list[float]]]:
     """Words of at most two of these trims that end at a goal but for `MET`, with their times."""
-    way, pairs = goal - problem.start, _pairs(problem.automaton, trims)
+    rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
+    way = goal - problem.start
     z, heading = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
-    kept = np.flatnonzero(pairs.aside(z, heading) <= BESIDE * (1.0 + abs(z)))
-    if not kept.size:
-        return
-    pairs, h = pairs.of(kept), np.full(kept.size, heading)
-    turns, turn = pairs.turns[0], pairs.turns[0] | pairs.turns[1]
+    i, j = np.indices((len(trims), len(trims))).reshape(2, -1)
+    v, w = rows[:, 0] + 1j * rows[:, 1], rows[:, 2]
+    turns = w != 0.0
+
+    def ended(h: Array) -> tuple[Array, Complexes, Complexes]:
+        """Of words that end heading `h`: heading at the switch, what is left, what stays aside."""
+        last = np.exp(1j * h)
+        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
+        between = np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]
+        switch = np.exp(1j * between)
+        left = z - r[i] * (switch - 1.0) - r[j] * (last - switch)  # for straights to cover
+        straight = np.where(turns[j], v[i], v[j] * switch)
+        aside = 1j * (left / straight).imag * straight
+        return between, left, np.where(turns[i] & turns[j], left, aside)
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        aside = pairs.ended(z, h)[2]
-        slope = (pairs.ended(z, h + BESIDE)[2] - aside) / BESIDE
+        r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
+        h = np.full(i.size, heading)
+        aside = ended(h)[2]
+        beside = np.where(turns[i] | turns[j], np.abs(aside), abs(wrapped(heading)))
+        kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
+        if not kept.size:
+            return
+        i, j, h, aside = i[kept], j[kept], h[kept], aside[kept]
+        slope = (ended(h + BESIDE)[2] - aside) / BESIDE
         most = (1.0 - ROUNDED) * MET  # by which the last heading may be off as well
         h = h + np.where(np.abs(aside) > most, (-aside / slope).real.clip(-most, most), 0.0)
-        between, left, _ = pairs.ended(z, h)
-        first, second = pairs.v[0], pairs.v[1] * np.exp(1j * between)
+        between, left, _ = ended(h)
+        first, second = v[i], v[j] * np.exp(1j * between)
         area = (first.conj() * second).imag
         times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
-        one = turn | (np.abs(area) <= NONE * np.abs(first * second))
-        alone = [(left / first).real, np.where(turns, (left / second).real, 0.0)]
+        one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
+        alone = [(left / first).real, np.where(turns[i], (left / second).real, 0.0)]
         times = np.where(one, alone, times)
-        angles = np.array([between, h - between]) * np.sign(pairs.w)
+        angles = np.array([between, h - between]) * np.sign(w[[i, j]])
         angles = np.remainder(angles + NONE, math.tau) - NONE
-        times = np.where(pairs.turns, angles / np.abs(pairs.w), times)
+        times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
     times[~((np.abs(times) < np.inf) & ((times > 0.0) | (times < -NONE)))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
-    rows = np.array([trim.body_velocity for trim in trims])
-    both = (times[0, :, None] * rows[pairs.first], times[1, :, None] * rows[pairs.second])
-    ends = group.exp(both[0]) @ group.exp(both[1])
+    ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
     off = ends.pose - np.array([z.real, z.imag, heading, *way[3:]])
     turned = np.abs(wrapped(off[:, 2]))
     off = np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
     for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():
-        numbered = zip((pairs.first[k], pairs.second[k]), times[:, k].tolist(), strict=True)
-        word = [(n, time) for n, time in numbered if time]
+        both = zip((i[k], j[k]), times[:, k].tolist(), strict=True)
+        word = [(n, time) for n, time in both if time]
         if (numbers := tuple(int(n) for n, _ in word)) not in seen:
             seen.add(numbers)
             yield [trims[n] for n in numbers], [time for _, time in word]

@@ -90,11 +90,7 @@ def unicycle_library(
 
 
 def gear_sequences(
-    problem: Problem,
-    libraries: Sequence[Automaton],
-    estimate: Estimate,
-    *,
-    budget: Budget,
+    problem: Problem, libraries: Sequence[Automaton], estimate: Estimate, *, budget: Budget
 ) -> Iterator[TimedDrive]:
     """Kinematic plans that differ: a promising one soon, then those that take the least time.
 

@@ -15,11 +15,7 @@ from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads import (
-    _kernels_beam,
-    _kernels_costs,
-    _kernels_motion,
-)
+from maneuver_automaton.roads import _kernels_beam, _kernels_costs, _kernels_motion
 from maneuver_automaton.roads.arrays import (
     BeamArrays,
     Clearing,
@@ -333,12 +329,7 @@ class RoadPlanner:
         stop = math.ceil(LONGEST_STOP / self.tick)
         controls = np.zeros((until - tick + library.limits.ticks + stop, 2))
         reaches, n, whole = _kernels_beam.search_beam(
-            task,
-            self.horizon,
-            first,
-            self.room,
-            np.array(SHARES),
-            controls,
+            task, self.horizon, first, self.room, np.array(SHARES), controls
         )
         if whole == 0:
             standing = self._standing(state, tick)

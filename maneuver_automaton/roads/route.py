@@ -65,13 +65,7 @@ def route_of(scene: RoadScene) -> Route:
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
     extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
-    return Route(
-        lanelets=tuple(path),
-        points=points,
-        heading=heading,
-        limit=limit,
-        extents=extents,
-    )
+    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, extents=extents)
 
 
 def hindrance(route: Route, scene: RoadScene, vehicle: RoadVehicle) -> str:

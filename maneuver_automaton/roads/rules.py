@@ -27,13 +27,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area, obstacles_in
 from maneuver_automaton.roads.plans import AT_REST
-from maneuver_automaton.roads.scene import (
-    EXACT,
-    GoalRegion,
-    RoadScene,
-    RoadStart,
-    presence_of,
-)
+from maneuver_automaton.roads.scene import EXACT, GoalRegion, RoadScene, RoadStart, presence_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 AT_LINE = 3.0  # [m] from the body to a line: who stands there has stopped at it

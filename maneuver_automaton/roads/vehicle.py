@@ -232,9 +232,7 @@ def road_library(
     )
     most = trims.speed.size * (2 * most_steps + 1) * max(counts)
     return RoadLibrary(
-        limits=limits,
-        trims=trims,
-        maneuvers=_kernels_motion.maneuvers_between(limits, trims, most),
+        limits=limits, trims=trims, maneuvers=_kernels_motion.maneuvers_between(limits, trims, most)
     )
 
 

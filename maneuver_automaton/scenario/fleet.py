@@ -303,10 +303,7 @@ def fleet_of_statement(
     kinds: dict[int, tuple[Scenario, Automaton]] = {}  # by the vehicle that the file names
     alone = []
     for one in statement.fleet:
-        rest, automaton = kinds.get(id(one.vehicle)) or (
-            beside or own_scenario(one, path),
-            None,
-        )
+        rest, automaton = kinds.get(id(one.vehicle)) or (beside or own_scenario(one, path), None)
         its = combined(one, rest, path=path)
         if automaton is not None:  # an equal one, made again
             its = replace(its, problem=replace(its.problem, automaton=automaton))

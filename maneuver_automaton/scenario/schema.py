@@ -348,8 +348,7 @@ TimedPoses = Annotated[
     AfterValidator(_in_time),
 ]
 Twists = Annotated[
-    tuple[Pose, ...],
-    Several("a list of [v_x, v_y, turn rate], one for every pose but the last"),
+    tuple[Pose, ...], Several("a list of [v_x, v_y, turn rate], one for every pose but the last")
 ]
 
 
@@ -386,8 +385,7 @@ class SearchPart(FilePart):
     """How to search, and for how long."""
 
     method: Annotated[
-        Literal["auto", "words", "insertion", "lattice"],
-        Need("auto, words, insertion or lattice"),
+        Literal["auto", "words", "insertion", "lattice"], Need("auto, words, insertion or lattice")
     ] = Field("auto", description="auto, words, insertion or lattice")
     time_limit_s: Positive = Field(5.0, description="upper bound for search and refinement")
     max_expansions: Count | None = optional("upper bound for the nodes expanded")

@@ -66,7 +66,7 @@ class BodyShape(FilePart, title="Shape"):
     rectangle_m: Size | None = optional("[length, width], ahead and aside")
     reference_m: Point | None = optional(
         "where the pose sits in the rectangle, from its centre: [ahead, left]; "
-        "a rear axle has ahead < 0",
+        "a rear axle has ahead < 0"
     )
     polygon_m: Polygon | None = optional("corners [x, y]")
     disc_m: Positive | None = optional("radius of a disc around the pose")

@@ -146,10 +146,7 @@ def _via(via: Via) -> dict[str, Any]:
     free = via.gate is not None and via.free_heading
     stop = via.stop and not via.stay_s
     return stated(
-        ViaPart,
-        via,
-        stop=stop,
-        **({"pose": None, "free_heading": False} if free else {}),
+        ViaPart, via, stop=stop, **({"pose": None, "free_heading": False} if free else {})
     )
 
 
