@@ -23,13 +23,15 @@ def as_array(
 ) -> Array:
     """`value` as finite float64 with `last` components in its last axis; `name` is for messages.
 
-    Real numbers of any type, no text and no dates, and of any shape where `last` is None. The array
-    is in the order of C, and `value` itself if it is one. `infinite`: times may be so.
+    Real numbers of any type, no text and no dates, and of any shape where `last` is None; elements
+    of a group are their poses. The array is in the order of C, and `value` itself if it is one.
+    `infinite`: times may be so.
     """
     try:
         known = np.asarray(value)
         if known.dtype.kind == "O":
-            known = np.array([_float(one) for one in known.flat]).reshape(known.shape)
+            read = [one.pose if hasattr(one, "inverse") else _float(one) for one in known.flat]
+            known = np.array(read).reshape(known.shape + np.shape(read)[1:])
         if known.dtype.kind not in REAL:
             raise TypeError
         array = np.asarray(known, dtype=np.float64, order="C")

@@ -34,6 +34,7 @@ WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 LONGER, LEAST_S = 1.5, 0.5  # than a coast is, and [s]: for how long points are close enough
 MOMENT = 1e-12  # [s] that every coast lasts there
 MOST_INTERVALS = 1 << 16
+MOST_STRETCHES = 1 << 20  # to begin with
 KINKED = 1.0 / 3.0  # of what two rules differ by, that the finer one is off at a kink of a rate
 NODES = np.linspace(0.0, 1.0, 5)
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
@@ -180,19 +181,13 @@ class _Motion:
         poses, twists, states = (
             one.reshape(*since.shape, -1) for one in self.steps(pieces, since.ravel())
         )
-        rates = np.asarray(rates_along(self.cost, poses, twists, states), dtype=np.float64)
-        if rates.shape != since.shape or not 0.0 <= rates.min() <= rates.max() < np.inf:
-            raise ValueError(
-                f"place cost {type(self.cost).__name__}: rates of shape {rates.shape} "
-                f"from {rates.min(initial=0.0):g}, need finite ones of at least 0 "
-                f"of shape {since.shape}"
-            )
+        rates = rates_along(self.cost, poses, twists, states)
         return rates * self._paces(twists), allowed(self.cost, poses, twists)
 
     def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
         """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""
         paces = self._paces(twists)
-        rates = np.asarray(rates_along(self.cost, poses, twists, states)) * paces
+        rates = rates_along(self.cost, poses, twists, states) * paces
         return rates, gradient_of(self.cost, poses, twists, states) * paces[:, None]
 
     def _paces(self, twists: Array) -> Array:
@@ -261,6 +256,12 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     begin = np.concatenate([np.zeros(len(coasts)), *(edges[:-1] for _, edges, _ in linked)])
     end = np.concatenate([lasting[coasts], *(edges[1:] for _, edges, _ in linked)])
     ways = np.abs(np.concatenate([steps[coasts], *(ways for _, _, ways in linked)]))
+    far = float(_speeds(ways).sum())
+    if far > MOST_STRETCHES * scale:
+        raise ValueError(
+            f"place costs: the finest feature has a scale of {scale:g} m, need at least "
+            f"{1.01 * far / MOST_STRETCHES:.2g} m along a way of {far:.3g} m"
+        )
     most = np.maximum(_speeds(ways) / scale, ways[:, 2] / TURN)
     parts = np.maximum(np.ceil(most), 1.0).astype(np.int64)
     row = np.repeat(np.arange(len(parts)), parts)

@@ -531,7 +531,7 @@ class _Moved:
         return scale_of(self.cost)
 
     def rates(self, poses: Array, velocities: Array) -> Array:
-        return self.cost.rates(self._back(poses), velocities)
+        return rates_along(self.cost, self._back(poses), velocities)
 
     def allows(self, poses: Array, velocities: Array) -> NDArray[np.bool_]:
         return allowed(self.cost, self._back(poses), velocities)
@@ -584,21 +584,30 @@ def extent_of(cost: PlaceCost) -> tuple[Shape, ...]:
 
 def scale_of(cost: PlaceCost) -> float:
     """Size [m] of the finest feature."""
-    return float(getattr(cost, "scale", SCALE))
+    about = f"place cost {type(cost).__name__}: scale"
+    scale = as_number(about, getattr(cost, "scale", SCALE))
+    if not scale > 0.0:
+        raise ValueError(f"{about} must be positive, got {scale} m")
+    return scale
 
 
 def allowed(cost: PlaceCost, poses: Array, velocities: Array) -> NDArray[np.bool_]:
     """Where (...,) the vehicle may be; everywhere if the cost does not say."""
     own: Callable[[Array, Array], NDArray[np.bool_]] | None = getattr(cost, "allows", None)
-    return np.ones(poses.shape[:-1], dtype=np.bool_) if own is None else own(poses, velocities)
+    said = np.ones(poses.shape[:-1]) if own is None else own(poses, velocities)
+    return _answer(cost, "allows", said, poses.shape[:-1]).astype(np.bool_)
 
 
-def rates_along(cost: PlaceCost, poses: Array, velocities: Array, states: Array | None) -> Array:
+def rates_along(
+    cost: PlaceCost, poses: Array, velocities: Array, states: Array | None = None
+) -> Array:
     """Rates (...,) where reduced states (..., n_z) are known, which place what is carried."""
-    with_states: Callable[..., Array] | None = getattr(cost, "rates_along", None)
-    if with_states is None:
-        return cost.rates(poses, velocities)
-    return with_states(poses, velocities, states)
+    own: Callable[..., Array] | None = getattr(cost, "rates_along", None)
+    said = own(poses, velocities, states) if own else cost.rates(poses, velocities)
+    rates = _answer(cost, "rates", said, poses.shape[:-1])
+    if (least := rates.min(initial=0.0)) < 0.0:
+        raise ValueError(f"place cost {type(cost).__name__}: rates: got {least:g}, need at least 0")
+    return rates
 
 
 def gradient_of(
@@ -607,7 +616,7 @@ def gradient_of(
     """Derivatives (..., dof) of the rates by the pose: its own, or central differences."""
     own: Callable[[Array, Array], Array] | None = getattr(cost, "gradient", None)
     if own is not None:
-        return np.array(own(poses, velocities))
+        return _answer(cost, "gradient", own(poses, velocities), poses.shape)
     axes = np.zeros((poses.shape[-1], *poses.shape))  # the vehicle's, which move with a problem
     for k, axis in enumerate(axes):
         axis[..., k] = 1.0
@@ -622,6 +631,15 @@ def gradient_of(
         )
         slopes += ((ahead - behind) / (2.0 * STEP))[..., None] * axis
     return slopes
+
+
+def _answer(cost: PlaceCost, what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """What a cost says at poses, as numbers of a shape."""
+    about = f"place cost {type(cost).__name__}: {what}"
+    found = as_array(about, value)
+    if found.shape != shape:
+        raise ValueError(f"{about}: got shape {found.shape}, need {shape}")
+    return found
 
 
 def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:

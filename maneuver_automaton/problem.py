@@ -68,7 +68,7 @@ class Goal:
 
         def __init__(
             self,
-            pose: ArrayLike,
+            pose: ArrayLike | _Element,
             *,
             trim: str | None = None,
             state: ArrayLike | Mapping[str, float] | None = None,
@@ -303,14 +303,13 @@ class Problem:
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
             place_costs: PlaceCost | Sequence[PlaceCost] = (),
-            via: Via | ArrayLike | Sequence[Via] = (),
+            via: Via | ArrayLike | _Element | Sequence[Via] = (),
             order: str = "given",
         ) -> None: ...
 
     def __post_init__(self) -> None:
         plain_numbers(self)
         dof = self.automaton.model.group.dof
-        object.__setattr__(self, "start", _pose_of(self.start))
         check_cost(self.cost)
         _known_rates(self.automaton, self.cost)
         for name, kind in (("bounds", Bounds), ("horizon", Horizon), ("search", SearchSettings)):
@@ -693,7 +692,6 @@ class Problem:
         if longer or self.automaton.translated is not None:  # more turns, or a heading of a trim's
             return replace(self, **changed)
         moved: Problem = object.__new__(Problem)
-        changed["start"] = _pose_of(start)
         if goals is not None:
             changed["goals"] = _as_goals(goals)
         known = {name: self.__dict__[name] for name in _FIELDS}
@@ -864,18 +862,12 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
     return {trim.name: (trim, known[trim.name]) for trim in automaton.trims}
 
 
-def _pose_of(value: Any) -> Any:
-    """The pose of a group element; anything else as it is."""
-    known = isinstance(value, np.ndarray | list | tuple)  # to look for attributes takes longer
-    return value.pose if not known and isinstance(value, _Element) else value
-
-
 def _as_vias(value: Any) -> tuple[Via, ...]:
     if isinstance(value, Via):
         return (value,)
     if isinstance(value, Sequence) and all(isinstance(one, Via) for one in value):
         return tuple(value)
-    if isinstance(value, Sequence) and any(isinstance(one, Via) for one in value):
+    if isinstance(value, Sequence) and any(isinstance(one, Via | _Element) for one in value):
         return tuple(via for one in value for via in _as_vias(one))
     return tuple(Via(pose) for pose in np.atleast_2d(as_array("via: pose", value)))
 
@@ -885,7 +877,6 @@ def _as_goals(value: Any) -> tuple[Goal, ...]:
         return (value,)
     if isinstance(value, tuple) and all(type(one) is Goal for one in value) and value:
         return value
-    value = _pose_of(value)
     if isinstance(value, Sequence) and any(isinstance(v, Goal | _Element) for v in value):
         return tuple(goal for one in value for goal in _as_goals(one))
     poses = as_array("goal: pose", value)

@@ -69,7 +69,7 @@ class Via:
 
         def __init__(
             self,
-            pose: ArrayLike | None = None,
+            pose: ArrayLike | LieGroup | None = None,
             *,
             free_heading: bool = False,
             tolerance_m: float = 0.0,

@@ -230,15 +230,25 @@ def test_what_is_wrong_is_said(make, said):
     assert said in str(error.value)
 
 
-def test_a_users_own_must_not_be_negative():
-    class Paid:
-        per = "metre"
-
-        def rates(self, poses, velocities):
-            return -np.ones(poses.shape[:-1])
-
-    with pytest.raises(ValueError, match="need finite ones of at least 0"):
-        problem(Paid()).cost_of(curved())
+@pytest.mark.parametrize(
+    ("has", "said"),
+    [
+        ({"rates": lambda p, v: -np.ones(p.shape[:-1])}, "rates: got -1, need at least 0"),
+        ({"rates": lambda p, v: np.full(p.shape[:-1], 1j)}, "rates: got array.*, need numbers"),
+        ({"rates": lambda p, v: 1.0}, r"rates: got shape \(\), need \("),
+        ({"allows": lambda p, v: 1.0}, r"allows: got shape \(\), need \("),
+        ({"gradient": lambda p, v: p[..., :2]}, r"gradient: got shape .*2\), need .*3\)"),
+        ({"scale": 0.0}, "scale must be positive, got 0.0 m"),
+        ({"scale": "x"}, "scale: got 'x', need a number"),
+        ({"scale": 1e-9}, "a scale of 1e-09 m, need at least 1.4e-05 m along a way of 14.7 m"),
+    ],
+)
+def test_what_a_users_own_must_not_say(has, said):
+    paid = Crosswind()
+    for name, value in has.items():
+        object.__setattr__(paid, name, value)
+    with pytest.raises(ValueError, match=said):
+        assert gradient_of(paid, *np.zeros((2, 5, 3))).sum() + problem(paid).cost_of(curved())
 
 
 def test_moving_obstacles_and_maps():

@@ -19,6 +19,7 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.via import Via
 
 ROBOT = Automaton.of_controls(
     Unicycle(), {"rest": (0.0, 0.0), "straight": (1.5, 0.0), "spin": (0.0, 1.0)}
@@ -56,6 +57,7 @@ def test_forms_of_a_start(start):
         Goal(pose=[1.0, 2.0, 0.5]),
         [[1.0, 2.0, 0.5]],
         [Goal(pose=[1.0, 2.0, 0.5])],
+        Goal(SE2([1.0, 2.0, 0.5])),
     ],
 )
 def test_forms_of_one_goal(goal):
@@ -161,6 +163,19 @@ def test_a_start_and_a_goal_are_single_poses():
 )
 def test_several_goals_of_either_form(goals):
     assert poses(problem(goals=goals)) == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]
+
+
+@pytest.mark.parametrize(
+    "via",
+    [
+        [SE2([1, 0, 0]), SE2([0, 1, 0.5])],
+        SE2([[1, 0, 0], [0, 1, 0.5]]),
+        [Via(SE2([1, 0, 0])), SE2([0, 1, 0.5])],
+    ],
+)
+def test_poses_on_the_way_of_either_form(via):
+    via = problem(via=via).via
+    assert [one.pose.tolist() for one in via] == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]
 
 
 def test_too_few_numbers_for_a_vehicle_that_climbs():

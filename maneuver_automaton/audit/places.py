@@ -13,7 +13,7 @@ from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.passages import AuditedBody
-from maneuver_automaton.places import Clearance, PlaceCost
+from maneuver_automaton.places import Clearance, PlaceCost, rates_along
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
@@ -62,7 +62,7 @@ def price_again(
             found, paid = np.empty(shares.size), np.arange(shares.size)
         twists = drive.twists_at(element[paid], shares[paid])
         if not isinstance(cost, Clearance):
-            found[:] = cost.rates(drive.frames.at(element, shares) + offset, twists)
+            found = rates_along(cost, drive.frames.at(element, shares) + offset, twists)
         if cost.per == "metre":
             planar = twists[:, 0] ** 2 + twists[:, 1] ** 2
             found[paid] *= np.sqrt(planar + (twists[:, 3:] ** 2).sum(axis=1))

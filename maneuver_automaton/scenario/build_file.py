@@ -43,6 +43,7 @@ from maneuver_automaton.scenario.parts import (
     Positive,
     Several,
     Text,
+    Truth,
     at,
     checked,
     made,
@@ -86,7 +87,7 @@ class JoiningPart(FilePart):
     pairs: Annotated[
         Literal["all", "neighbours"] | Annotated[int, Strict(), Ge(1)], Need(PAIRS)
     ] = Field("all", description=PAIRS)
-    late: bool = Field(False, description="limited rates: also maneuvers that wait first")
+    late: Truth = Field(False, description="limited rates: also maneuvers that wait first")
     strokes_m: Numbers = Field((), description="limited rates: lengths from rest to rest")
     turns_rad: Numbers = Field((), description="limited rates: turns on the spot")
     time: NotNegative = Field(1.0, description="optimal control: price of a second")

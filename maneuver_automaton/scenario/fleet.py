@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
-from pydantic import Field, Strict
+from pydantic import Field
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
@@ -29,6 +29,7 @@ from maneuver_automaton.scenario.parts import (
     Positive,
     Several,
     Text,
+    Truth,
     Whole,
     at,
     checked,
@@ -128,9 +129,7 @@ class VehicleEntry(FilePart):
 
     name: Name | None = optional("a name of its own; left out: its number, from 1")
     priority: Number = Field(0.0, description="the greater, the sooner it is planned")
-    leaves: Annotated[bool, Strict(), Need("true or false")] = Field(
-        False, description="true: it is gone once it has arrived"
-    )
+    leaves: Truth = Field(False, description="true: it is gone once it has arrived")
     start_time_s: Number | None = optional("time at the start; until then it waits")
     vehicle: VehiclePart | None = optional(AT_TOP)
     automaton: AutomatonPart | None = optional(AT_TOP)

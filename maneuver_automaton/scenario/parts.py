@@ -114,6 +114,7 @@ NotNegative = Annotated[
 ]
 Count = Annotated[int, Strict(), Ge(1), Need("a whole number of at least 1")]
 Whole = Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")]
+Truth = Annotated[bool, Strict(), Need("true or false")]
 Text = Annotated[str, Strict(), Need("a text")]
 Name = Annotated[str, Strict(), Field(pattern=r"\S"), Need("a name, a text that is not empty")]
 Point = Annotated[

@@ -39,6 +39,7 @@ from maneuver_automaton.scenario.parts import (
     Several,
     Size,
     Text,
+    Truth,
     Whole,
     need,
     one_or_many,
@@ -107,7 +108,7 @@ class GridPart(FilePart, title="Grid"):
     max_lateral_acceleration_m_s2: Positive | None = optional(
         "greatest speed times turn rate of a trim; left out: no limit"
     )
-    leave_out: bool = Field(
+    leave_out: Truth = Field(
         False, description="true: points without a trim are left out, not refused"
     )
 
@@ -118,7 +119,7 @@ class ManeuversPart(FilePart):
     pairs: Annotated[Literal["all", "neighbours"], Need("all or neighbours")] = Field(
         "neighbours", description="all, or neighbours: at most one level apart in every axis"
     )
-    late: bool = Field(False, description="also what is as quick but changes late")
+    late: Truth = Field(False, description="also what is as quick but changes late")
     strokes_m: Numbers = Field((), description="lengths from rest to rest, negative in reverse")
     turns_rad: Numbers = Field((), description="turns on the spot, from rest to rest")
 
@@ -195,9 +196,9 @@ class ViaPart(FilePart, title="Via"):
     """What the plan passes on its way: a pose, or a gate."""
 
     pose: ViaPose | None = optional("[x, y, heading]; of a gate it lies on it, for the heading")
-    free_heading: bool = Field(False, description="true: any heading will do")
+    free_heading: Truth = Field(False, description="true: any heading will do")
     tolerance_m: NotNegative = Field(0.0, description="distance that is near enough; 0: exact")
-    stop: bool = Field(False, description="true: it comes to rest there")
+    stop: Truth = Field(False, description="true: it comes to rest there")
     stay_s: NotNegative = Field(0.0, description="how long it stands there")
     gate: Gate | None = optional("[[x, y], [x, y]]: a segment that is crossed anywhere")
 
@@ -302,7 +303,7 @@ class HorizonPart(FilePart):
         "shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
     )
     max_time_s: Positive | None = optional("longest time, when time_s is free")
-    stay: bool = Field(
+    stay: Truth = Field(
         False, description="it stays at the goal, when time_s is free: nothing may pass there later"
     )
 
@@ -395,14 +396,14 @@ class SearchPart(FilePart):
         Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a finite number of at least 1")]
         | None
     ) = optional("lattice: weight of the cost to go")
-    backwards: bool = Field(
+    backwards: Truth = Field(
         False, description="lattice_body: search from the goals; false: from the start"
     )
-    show_nodes: bool = Field(False, description="lattice: draw what the first plan's search tried")
-    improve: bool = Field(
+    show_nodes: Truth = Field(False, description="lattice: draw what the first plan's search tried")
+    improve: Truth = Field(
         True, description="look for better plans once there is one; false: return the first"
     )
-    polish: bool = Field(
+    polish: Truth = Field(
         True, description="with inertia: motions that the library does not have; false: none"
     )
 
@@ -454,11 +455,11 @@ class RecedingHorizonPart(FilePart):
     margin: NotNegative = Field(
         0.0, description="a new word must be cheaper by more than this; 0: the optimum"
     )
-    retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
+    retimed: Truth = Field(False, description="drive plans at the pace of uniform effort")
     pieces: Count | None = optional(
         "parts of a plan with controls between those of the library; left out: 0"
     )
-    stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
+    stay: Truth = Field(False, description="go on within the goal's tolerance for all steps")
     disturbance: LateNoisePart | None = optional("{position_m, heading_rad, seed, ...}")
 
 
@@ -493,7 +494,7 @@ class ZonePart(FilePart):
     map: Name | None = optional("mask of a speed filter (YAML), relative to this file")
     speed_limit: MaskLimitPart | None = optional("{base, multiplier, unit} of the mask")
     max_speed_m_s: NotNegative | None = optional("greatest speed in it")
-    reverse: bool = Field(True, description="false: forwards only")
+    reverse: Truth = Field(True, description="false: forwards only")
     max_lateral_acceleration_m_s2: NotNegative | None = optional(
         "greatest speed times turn rate in it"
     )

@@ -13,7 +13,15 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_with
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.places import Clearance, PlaceCost, allowed, bound, extent_of, scale_of
+from maneuver_automaton.places import (
+    Clearance,
+    PlaceCost,
+    allowed,
+    bound,
+    extent_of,
+    rates_along,
+    scale_of,
+)
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.arrays import LeastPrices, PlaceArrays
 from maneuver_automaton.search.distance_grid import NO_PRICES
@@ -153,7 +161,7 @@ def _sampled(
         for sheet in (2,) if one.per == "second" else range(min(sheets, 2)):
             velocities = np.broadcast_to(ahead * (1.0, -1.0, 1.0)[sheet], poses.shape)
             forbidden = np.where(allowed(one, poses, velocities), 0.0, FORBIDDEN)
-            value[sheet, :, i, j] += 0.25 * (one.rates(poses, velocities) + forbidden)
+            value[sheet, :, i, j] += 0.25 * (rates_along(one, poses, velocities) + forbidden)
     if (value == value[:, :1]).all():
         value = value[:, :1]
     if sheets == 3 and (value[0] == value[1]).all() and not value[2].any():

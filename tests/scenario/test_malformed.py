@@ -145,6 +145,14 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         cost("effort: true"),
         ":11: cost.effort: got true, need a finite number of at least 0",
     ),
+    "word as truth": (
+        goal(" {pose: [1.0, 1.0, 0.0]}\nvia: [{pose: [0.5, 0.5, 0.0], stop: 'yes'}]"),
+        ":11: via[0].stop: got 'yes', need true or false",
+    ),
+    "number as truth": (
+        search("improve: 1"),
+        ":13: search.improve: got 1, need true or false",
+    ),
     "yes is a word": (
         cost("effort: yes"),
         ":11: cost.effort: got 'yes', need a finite number of at least 0",
