@@ -34,15 +34,15 @@ EXACT = 1.1 / (NEAR * SHARP)  # of a reach to a distance, below which clearances
 
 
 class PlaceCost(Protocol):
-    """A cost that sees where the vehicle is: a rate of at least 0 at poses.
+    """A cost that sees where the vehicle is: a finite rate of at least 0 at poses.
 
     Rates and `per` are all that it takes. It may also have ``gradient(poses, velocities)``, its
     derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
     x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
     it knows obstacles and body; ``smooth()``, nearly the same without jumps, for better coasting
     times; ``scale`` [m], the size of its finest feature; ``continuous``, whether rates never jump;
-    and ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
-    differences, is 0, or is the cost at poses moved back.
+    and ``allows(poses, velocities)`` (...,), where the vehicle may be at all. What is missing is
+    found by differences, is 0, or is the cost at poses moved back.
 
     Examples
     --------

@@ -106,7 +106,7 @@ def distance_to(end: Array, goal: Goal) -> TerminalError:
     x, y, heading, *higher = end.tolist()
     turned = 0.0
     if not goal.free_heading:
-        turned = abs((heading - float(goal.pose[2]) + math.pi) % (2.0 * math.pi) - math.pi)
+        turned = abs(math.remainder(heading - float(goal.pose[2]), 2.0 * math.pi))
     return TerminalError(position_m=math.hypot(x, y, *higher), heading_rad=turned)
 
 
@@ -177,15 +177,7 @@ def audit_plan(
         abs(float(t.body_velocity[2])) * d for t, d in zip(near.trims, near.durations, strict=True)
     )
     if turned > MOST_TURNED:
-        missed = distance_to(near.end, goal)
-        return Audit(
-            passed=False,
-            max_dynamics_defect=math.inf,
-            min_clearance_m=None,
-            terminal_position_m=missed.position_m,
-            terminal_heading_rad=missed.heading_rad,
-            reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
-        )
+        return _not_driven(near, goal, turned)
     drive = driven(near, model)
     missed = distance_to(drive.end, goal)
     reasons = []
@@ -218,8 +210,7 @@ def audit_plan(
     prices: list[float] = []
     if places is not None and places.costs:
         ask()
-        offset = np.array(goal.pose)
-        offset[2] = 0.0
+        offset = np.array([*goal.pose[:2], 0.0, *goal.pose[3:]])
         known = list(bodies.values()), around(obstacles, origin)
         for cost, stated in zip(places.costs, places.prices, strict=True):
             prices.append(price_again(cost, drive, offset, *known, whole=places.whole))
@@ -235,6 +226,19 @@ def audit_plan(
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
         place_price=sum(prices) if prices else None,
+    )
+
+
+def _not_driven(near: Plan, goal: Goal, turned: float) -> Audit:
+    """The audit of a plan that turns too much [rad] for anybody to drive it again."""
+    missed = distance_to(near.end, goal)
+    return Audit(
+        passed=False,
+        max_dynamics_defect=math.inf,
+        min_clearance_m=None,
+        terminal_position_m=missed.position_m,
+        terminal_heading_rad=missed.heading_rad,
+        reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
     )
 
 

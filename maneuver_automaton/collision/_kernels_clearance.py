@@ -163,46 +163,45 @@ def piece_clearance(
 
 
 @bare_inner_kernel
+def field_at(field: Field, body: Body, d: int, place: Place) -> tuple[float, float, float]:
+    """The distance stored for the cell that the middle of a disc is in; where it is from there.
+
+    The cell's middle is what the distance is from; (x, y) in cells.
+    """
+    x, y, c, s = place
+    q_x, q_y = body.discs[d, 0], body.discs[d, 1]
+    at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
+    at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
+    i, j = math.floor(at_x), math.floor(at_y)
+    if 0 <= i < field.distance.shape[1] and 0 <= j < field.distance.shape[0]:
+        return field.distance[int(j), int(i)], at_x - i - 0.5, at_y - j - 0.5
+    return field.outside, 0.0, 0.0  # the field reaches that far beyond all solids
+
+
+@bare_inner_kernel
 def field_bound(field: Field, body: Body, place: Place) -> float:
     """Lower bound of the clearance from the distances stored at cell centres, by discs."""
-    x, y, c, s = place
     best = math.inf
     for d in range(body.discs.shape[0]):
-        q_x, q_y = body.discs[d, 0], body.discs[d, 1]
-        # The field holds the distance at the middle of its cell. Distance is 1-Lipschitz, so less
-        # how far the disc's middle is from there it is a lower bound at that middle, and less the
-        # radius one for all of the disc. The discs cover the body: the least of their bounds holds
-        # for all of it.
-        at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
-        at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
-        i, j = math.floor(at_x), math.floor(at_y)
-        if 0 <= i < field.distance.shape[1] and 0 <= j < field.distance.shape[0]:
-            e_x, e_y = at_x - i - 0.5, at_y - j - 0.5
-            away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
-            value = field.distance[int(j), int(i)] - away
-        else:
-            # The field reaches that far beyond all solids.
-            value = field.outside
-        best = min(best, value - body.discs[d, 2])
+        # Distance is 1-Lipschitz: less how far the disc's middle is from that of the cell it is a
+        # lower bound at that middle, and less the radius one for all of the disc. The discs cover
+        # the body: the least of their bounds holds for all of it.
+        known, e_x, e_y = field_at(field, body, d, place)
+        away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
+        best = min(best, known - away - body.discs[d, 2])
     return best
 
 
 @bare_inner_kernel
 def surely_hits(field: Field, body: Body, place: Place) -> bool:
     """Whether a solid reaches into one of the discs inside the body, as the field tells."""
-    x, y, c, s = place
     for d in range(body.discs.shape[0]):
-        q_x, q_y = body.discs[d, 0], body.discs[d, 1]
-        at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
-        at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
-        i, j = math.floor(at_x), math.floor(at_y)
-        if 0 <= i < field.distance.shape[1] and 0 <= j < field.distance.shape[0]:
-            # As in `field_bound`, but that distances grow no faster, either.
-            left = body.discs[d, 3] - field.distance[int(j), int(i)]
-            if left > 0.0:
-                e_x, e_y = field.cell * (at_x - i - 0.5), field.cell * (at_y - j - 0.5)
-                if e_x * e_x + e_y * e_y < left * left:
-                    return True
+        # As in `field_bound`, but that distances grow no faster, either. Outside of the field they
+        # are at least what holds there, more than the radius of any such disc.
+        known, e_x, e_y = field_at(field, body, d, place)
+        left = (body.discs[d, 3] - known) / field.cell
+        if left > 0.0 and e_x * e_x + e_y * e_y < left * left:
+            return True
     return False
 
 

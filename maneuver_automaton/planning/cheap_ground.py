@@ -43,8 +43,7 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     places = np.vstack([query.start, *query.goals])[:, :2] - low
     while True:
         rates, cell = whole[:, ::every, ::every], every * place.cell
-        ends = np.rint(places / cell).astype(np.int64)
-        ends = np.clip(ends, 0, np.array(rates.shape[:0:-1]) - 1)
+        ends = np.rint(places / cell).clip(0, np.array(rates.shape[:0:-1]) - 1).astype(np.int64)
         cost, way = _cheapest_way(rates, ends)
         if every <= finest:
             break
