@@ -117,4 +117,4 @@ __version__ = "0.1.0"
 __getattr__, __dir__ = lazily(__name__)
 __all__ = [name for name in __dir__() if not name.startswith("__")]
 
-_display.register(lambda: importlib.import_module("maneuver_automaton.plotting.pictures"))
+_display.register(lambda: importlib.import_module("maneuver_automaton.plotting.player"))

@@ -173,7 +173,10 @@ def _run_file(job: Job, out: Path) -> int:
     beside = job.command == "plan" and job.options.plot and not is_road(job.path)
     with draughtsman(wanted=beside) as one:
         outcome = job.done(out)
-        order = (draw, outcome.result, outcome.name, out / "plan", job.options)
+        shown = outcome.result
+        if shown is not None and job.options.budgets.gap is None:
+            shown = recording_of(shown)  # which is read without all that plans
+        order = (draw, shown, outcome.name, out / "plan", job.options)
         begun = one is not None and not stopped() and one.begin(*order)
         if not begun:
             job.drawn(outcome, out)

@@ -24,24 +24,21 @@ def draw(result: Any, name: str, file: Path, options: Options) -> None:
     if options.plot and (moves or not on_roads):
         look = options.look.look(name)
         plotting.save_picture(recording, file.with_suffix(".png"), look=look)
-        _draw_more(recording, result, file, options, look)
+        is_plan = recording.kind == "plan"
+        if is_plan and plotting.flies_among_heights(recording):
+            plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
+        if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
+            progress = file.with_name("progress.png")
+            plotting.save_progress_figure(result, progress, title=look.title)
+        if recording.alternatives:
+            path = file.with_name("alternatives.png")
+            plotting.save_picture(recording, path, look=look, view="alternatives")
     if options.animate and moves:
         save_film(recording, file.with_suffix(".gif"), options.look.look(name))
     page = options.html or (options.animate and file.name == "closed_loop")
     if page and (moves or not on_roads or len(recording.movers) == 1):
-        result.player(title=options.look.title or name).save(file.with_suffix(".html"))
-
-
-def _draw_more(recording: Recording, result: Any, file: Path, options: Options, look: Look) -> None:
-    """Further pictures of a plan, where there is something to see in them."""
-    plotting, is_plan = ready_to_draw(), recording.kind == "plan"
-    if is_plan and plotting.flies_among_heights(recording):
-        plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
-    if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
-        plotting.save_progress_figure(result, file.with_name("progress.png"), title=look.title)
-    if recording.alternatives:
-        path = file.with_name("alternatives.png")
-        plotting.save_picture(recording, path, look=look, view="alternatives")
+        player = plotting.player_of(result, title=options.look.title or name)
+        player.save(file.with_suffix(".html"))
 
 
 def save_film(recording: Recording, path: Path, look: Look) -> None:
@@ -62,14 +59,10 @@ def ready_to_draw() -> Any:
     """What draws; Matplotlib writes no documentation of its classes, a fifth of its import."""
     from matplotlib import artist
 
-    artist.kwdoc = _nothing  # type: ignore[assignment]
+    artist.kwdoc = lambda artist: ""
     from maneuver_automaton import plotting
 
     return plotting
-
-
-def _nothing(_: object) -> str:
-    return ""
 
 
 class Draughtsman:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Shape
+from maneuver_automaton.collision import Disc, Obstacle, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines, rings_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import SEQUENCE, Color, fleet_colors, track_colors
@@ -48,7 +48,11 @@ def view_box(world: Environment, times: Array, points: Array, *, size: float) ->
     All obstacles and limits, unless they are much larger than that: then those that are near.
     """
     low, high = points.min(axis=0), points.max(axis=0)
-    around = obstacle_boxes(world.obstacles, times) + limit_boxes(world.zones, world.bounds)
+    paths = [shape_path(one.shape) for one in static_shapes(world.obstacles)]
+    paths += [one.at(t) for one in moving_shapes(world.obstacles) for t in times.tolist()]
+    maps = [one for one in world.obstacles if isinstance(one, OccupancyMap) and one.blocked.any()]
+    around = [np.asarray(path.get_extents().get_points()) for path in paths]
+    around += [*map(_map_box, maps), *limit_boxes(world.zones, world.bounds)]
     boxes = np.concatenate([np.zeros((0, 2)), *around])
     if not boxes.size:
         return np.array([low, high])
@@ -85,15 +89,6 @@ def set_view(ax: Axes, box: Array, place: Array) -> None:
     ax.autoscale_view()
     tidy(ax, x="x [m]", y="y [m]")
     count_from_near(ax, place)
-
-
-def obstacle_boxes(obstacles: Sequence[AnyObstacle], times: Array) -> list[Array]:
-    """Corners (2, 2) around each obstacle, and around each moving one at each time."""
-    paths = [shape_path(one.shape) for one in static_shapes(obstacles)]
-    paths += [one.at(t) for one in moving_shapes(obstacles) for t in times.tolist()]
-    boxes = [np.asarray(path.get_extents().get_points()) for path in paths]
-    maps = [one for one in obstacles if isinstance(one, OccupancyMap) and one.blocked.any()]
-    return boxes + [_map_box(one) for one in maps]
 
 
 def _map_box(cells: OccupancyMap) -> Array:
@@ -313,8 +308,12 @@ def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
         points = np.concatenate([points, *(ring for one in actors for ring in one.goal_outlines)])
         size = float(np.ptp(points, axis=0).max()) or STILL_SIZE_M
     box = _road_box(recording, points) if world.lanes else view_box(world, times, points, size=size)
+    twists: dict[str, Array] = {}  # of all trims that are planned or driven
+    for one in actors:
+        for track in (*(track for _, track in one.held), one.track):
+            twists |= {name: twist for name, twist in track.twists.items() if name not in twists}
     return Cast(
-        recording=recording, actors=actors, times=times, colors=_trim_colors(actors), box=box,
+        recording=recording, actors=actors, times=times, colors=track_colors(twists), box=box,
         size=mark_size(first, world, box, size=size) if alone else size,
     )  # fmt: skip
 
@@ -338,15 +337,6 @@ def _size(one: Actor) -> float:
     apart = np.linalg.norm(np.concatenate([*places, *goals]) - one.track.start[:2], axis=1)
     size = max(float(apart.max()), 2.0 * one.reach)
     return size if size > 1e-9 else STILL_SIZE_M
-
-
-def _trim_colors(actors: Sequence[Actor]) -> dict[str, Color]:
-    """A colour for every trim that is planned or driven."""
-    twists: dict[str, Array] = {}
-    for one in actors:
-        for track in (*(track for _, track in one.held), one.track):
-            twists |= {name: twist for name, twist in track.twists.items() if name not in twists}
-    return track_colors(twists)
 
 
 def _road_box(recording: Recording, points: Array) -> Array:

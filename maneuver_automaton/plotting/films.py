@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_bytes_atomically
-from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
+from maneuver_automaton.plotting.cast import Cast, cast_of
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import MOVING, moving_shapes, show_presence
@@ -296,16 +296,13 @@ def _bodies(cast: Cast, time: float, dart: Sequence[Array]) -> list[tuple[Array,
     rows = []
     for one in cast.actors if cast.is_alone else [one for one in cast.actors if one.mover.has_plan]:
         rings = one.bodies_at(time) or (placed(dart, one.mover.pose_at(time)[None]) if dart else [])
-        color = _trim_color(one, time, cast) if cast.is_alone else one.color
+        color = one.color
+        if cast.is_alone:
+            after = int(np.searchsorted(one.track.switching_times[1:-1], time, side="right"))
+            pieces = one.track.pieces
+            color = cast.colors.get(pieces[after].name, GREY) if pieces else INK
         rows += [(ring, color) for ring in rings]
     return rows
-
-
-def _trim_color(one: Actor, time: float, cast: Cast) -> Color:
-    if not one.track.pieces:
-        return INK
-    after = int(np.searchsorted(one.track.switching_times[1:-1], time, side="right"))
-    return cast.colors.get(one.track.pieces[after].name, GREY)
 
 
 def _said(cast: Cast, time: float) -> list[str]:

@@ -176,6 +176,8 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
     arcs, heads = _spin_symbols(spins if len(spins) <= MOST_SPINS else [], size=size)
     spin_colors = [colors[piece.name] for piece in spins[: len(arcs)]]
     still = [p for p in track.pieces if _symbol(p) and p.name in track.seen]
+    others = [goal for k, goal in enumerate(one.goals) if k != one.reached]
+    missed = [goal.pose for goal in others if not goal.free_heading]
     loop = bool(one.held) or len(one.mover.pieces) > 1
     artists: dict[str, Any] = {
         "path": LineCollection(
@@ -189,7 +191,10 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
         "spins": LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
         "spin_heads": PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
         "moments": _moment_bodies(one, cast),
-        "wanted": _goal_bodies(one),
+        "wanted": PolyCollection(  # at goals that are not reached and ask for a heading
+            placed(one.body, np.array(missed)) if missed else [], facecolors="none",
+            edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
+        ),
     }  # fmt: skip
     if loop:
         artists |= _steps_of(ax, cast, one)
@@ -208,7 +213,7 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
             edgecolors=[colors[piece.name] for piece in some], linewidths=1.8, zorder=4.5,
         )  # fmt: skip
     for part in artists.values():
-        if part.axes is None:
+        if part.axes is None and len(part.get_paths()):
             ax.add_collection(part)
     return artists | draw_ends(
         ax, track.start, one.goals, size=size, reached=one.reached, via=one.mover.via
@@ -363,18 +368,13 @@ def _shown_times(track: Track, *, apart: float) -> Array:
     times = track.switching_times
     if not 1 <= len(track.pieces) <= MOST_MOTIONS:
         return times
-    inner = [
-        np.linspace(piece.time[0], piece.time[-1], _bodies_within(piece, apart=apart) + 2)[1:-1]
-        for piece in track.pieces
-        if np.ptp(piece.control, axis=0).any()
-    ]
-    return np.sort(np.concatenate([times, *inner]))
-
-
-def _bodies_within(piece: TrackPiece, *, apart: float) -> int:
-    """How many bodies have room within a piece, `apart` [m] from each other and from its ends."""
-    length = float(np.linalg.norm(np.diff(piece.pose[:, :2], axis=0), axis=1).sum())
-    return min(INNER_BODIES, max(0, int(length / apart) - 1)) if apart > 0.0 else 0
+    if apart > 0.0:
+        for piece in (one for one in track.pieces if np.ptp(one.control, axis=0).any()):
+            length = float(np.linalg.norm(np.diff(piece.pose[:, :2], axis=0), axis=1).sum())
+            within = min(INNER_BODIES, max(0, int(length / apart) - 1))
+            inner = np.linspace(piece.time[0], piece.time[-1], within + 2)[1:-1]
+            times = np.concatenate([times, inner])
+    return np.sort(times)
 
 
 def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
@@ -408,17 +408,6 @@ def _moment_bodies(one: Actor, cast: Cast) -> PolyCollection:
     return PolyCollection(
         outlines, facecolors=[(*color, 0.85) for color in colors],
         edgecolors=[INK], linewidths=1.1, zorder=3.7,
-    )  # fmt: skip
-
-
-def _goal_bodies(one: Actor) -> PolyCollection:
-    """Dashed outlines at the goals that are not reached and ask for a heading."""
-    poses = [
-        goal.pose for k, goal in enumerate(one.goals) if k != one.reached and not goal.free_heading
-    ]
-    return PolyCollection(
-        placed(one.body, np.array(poses)) if poses else [], facecolors="none",
-        edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,11 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.quiver import Quiver
 
-from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.plotting.automata import save_automaton_figure
 from maneuver_automaton.plotting.cast import MARGIN, Cast, cast_of, cast_of_alternatives, set_view
-from maneuver_automaton.plotting.colors import INK, LANE, SEQUENCE
+from maneuver_automaton.plotting.colors import GREY, INK, LANE, SEQUENCE
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import (
     draw_ground,
@@ -32,13 +30,13 @@ from maneuver_automaton.plotting.obstacles import (
 from maneuver_automaton.plotting.over_time import panels_of
 from maneuver_automaton.plotting.pages import EDGE, page_of, write_figure
 from maneuver_automaton.plotting.paths import draw_path, end_entries, path_entries
-from maneuver_automaton.plotting.player import player_of as player_of
-from maneuver_automaton.plotting.searches import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.style import SMALL_PT, Entries, outer_legend, word_text
 from maneuver_automaton.plotting.together import draw_vehicles, vehicle_entries
 from maneuver_automaton.recording import Recording, Search, recording_of
 
 REACHED = (0.82, 0.89, 0.95)  # not through: squares of several sizes lie upon each other
+COLORMAP = "viridis_r"  # pale for cheap, dark for costly; made for colour-blind readers too
+TICK_IN = 0.05  # [in] length of a tick
 RING_PT = 16.0  # size of the ring around a passage
 
 
@@ -150,8 +148,17 @@ def _draw_search(ax: Axes, search: Search) -> dict[str, Any]:
     """What a search expanded, the places that a vehicle may get to, and the passage it cannot."""
     artists: dict[str, Any] = {}
     if search.nodes is not None:
-        costs = search.nodes[:, 3] if search.nodes.shape[-1] == 4 else None
-        artists["nodes"] = draw_nodes(ax, search.nodes[:, :3], cost=costs)
+        x, y, heading = search.nodes[:, :3].T
+        artists["nodes"] = ticks = Quiver(  # they point where each heads
+            ax, x, y, np.cos(heading), np.sin(heading), color=[GREY], units="inches",
+            scale_units="inches", scale=1.0 / TICK_IN, width=0.011, headwidth=1.0, headlength=0.0,
+            headaxislength=0.0, minlength=0.0, alpha=0.8, zorder=1.5,
+        )  # fmt: skip
+        if search.nodes.shape[-1] == 4:
+            ticks.set_array(search.nodes[:, 3])
+            ticks.set_cmap(COLORMAP)
+            ticks.autoscale()
+        ax.add_collection(ticks, autolim=False)
     if search.reached is not None:
         artists["reached"] = PolyCollection(
             list(np.asarray(search.reached)), facecolors=[REACHED], edgecolors=[REACHED],
@@ -266,9 +273,15 @@ def _figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
     artists = draw_cast(page.plane, cast, numbered=look.numbered)
     for ax, panel in zip(page.panels, panels, strict=False):
         panel.draw(ax)
-    page.share_times()
+    for ax in page.panels[:-1] if page.is_stacked else ():  # times stand below the lowest
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
     if (ticks := artists.get("nodes")) is not None and ticks.get_array() is not None:
-        draw_cost_bar(page.figure, page.plane, ticks)
+        above = page.plane.inset_axes((0.5, 1.02, 0.5, 0.02))
+        bar = page.figure.colorbar(ticks, cax=above, location="top")
+        bar.outline.set_visible(False)
+        above.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
+        bar.set_label("cost of expanded nodes", fontsize=SMALL_PT, color=INK)
     return page.figure
 
 
@@ -308,14 +321,3 @@ def _reasons(recording: Recording) -> list[str]:
         lines.append(f"{', '.join(names[:MOST_NAMES])}{rest}: {reason}")
     more = len(lines) - MOST_REASONS
     return lines if more <= 0 else [*lines[:MOST_REASONS], f"and {more} more reasons"]
-
-
-def picture_of(value: Any) -> bytes:
-    """The picture of a value as a PNG."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "picture.png"
-        if isinstance(value, Automaton):
-            save_automaton_figure(value, file)
-        else:
-            save_picture(recording_of(value), file)
-        return file.read_bytes()

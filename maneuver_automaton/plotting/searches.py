@@ -9,55 +9,16 @@ from typing import Protocol
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.quiver import Quiver
 from matplotlib.ticker import NullFormatter
-from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.paths import draw_goal, draw_headings
-from maneuver_automaton.plotting.style import SMALL_PT, tidy
-
-COLORMAP = "viridis_r"  # pale for cheap, dark for costly; made for colour-blind readers too
-TICK_IN = 0.05  # [in] length of a tick
-
-
-def draw_nodes(ax: Axes, nodes: ArrayLike, *, cost: ArrayLike | None = None) -> Quiver:
-    """Draw expanded `nodes` on `ax`, which keeps its limits: ticks that point where each heads."""
-    poses = as_array("nodes", nodes, last=3)
-    if poses.ndim != 2:
-        raise ValueError(f"nodes: got shape {poses.shape}, need (n, 3)")
-    x, y, heading = poses.T
-    ticks = Quiver(
-        ax, x, y, np.cos(heading), np.sin(heading), color=[GREY], units="inches",
-        scale_units="inches", scale=1.0 / TICK_IN, width=0.011, headwidth=1.0, headlength=0.0,
-        headaxislength=0.0, minlength=0.0, alpha=0.8, zorder=1.5,
-    )  # fmt: skip
-    if cost is not None:
-        costs = as_array("nodes: cost", cost)
-        if costs.shape != x.shape:
-            raise ValueError(f"nodes: got {costs.shape} costs for {len(x)} nodes")
-        ticks.set_array(costs)
-        ticks.set_cmap(COLORMAP)
-        ticks.autoscale()
-    ax.add_collection(ticks, autolim=False)
-    return ticks
-
-
-def draw_cost_bar(figure: Figure, ax: Axes, ticks: Quiver) -> None:
-    """A colour bar of nodes with costs, above the axes where they are."""
-    bar = figure.colorbar(
-        ticks, ax=ax, location="top", shrink=0.5, aspect=30, pad=0.02, anchor=(1, 0)
-    )
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
-    bar.set_label("cost of expanded nodes", fontsize=SMALL_PT, color=INK)
-
+from maneuver_automaton.plotting.style import tidy
 
 EARLIEST = 1e-3  # [s] from where time is drawn, on a logarithmic axis
 ABOVE = 1.35  # times the final cost, up to which first plans are drawn
@@ -105,13 +66,9 @@ def draw_progress(ax: Axes, result: PlanResult) -> None:
     ):
         ax.step(*zip(*steps, strict=True), where="post", color=color, linewidth=1.6)
         ax.annotate(
-            f"{name} {steps[-1][1]:.6g}",
-            steps[-1],
-            xytext=(5, lifted),
-            textcoords="offset points",
-            fontsize=8.0,
-            color=INK,
-        )
+            f"{name} {steps[-1][1]:.6g}", steps[-1], xytext=(5, lifted),
+            textcoords="offset points", fontsize=8.0, color=INK,
+        )  # fmt: skip
     ax.set_xscale("log")
     ax.xaxis.set_minor_formatter(NullFormatter())  # between the decades labels lie on each other
     ax.set_xlim(EARLIEST, end)
@@ -172,15 +129,9 @@ def draw_factor(ax: Axes, proof: _Factors) -> QuadMesh:
     factors = np.ma.masked_invalid(_worst_factors(proof, half))
     most = max(proof.sampled, 1.0 + 1e-3)
     places = ax.pcolormesh(
-        across,
-        across,
-        factors,
-        cmap=SHADES,
-        vmin=1.0,
-        vmax=most,
-        shading="nearest",
+        across, across, factors, cmap=SHADES, vmin=1.0, vmax=most, shading="nearest",
         rasterized=True,
-    )
+    )  # fmt: skip
     ax.add_patch(Circle((0.0, 0.0), proof.radius, fill=False, edgecolor=GREY))
     size = ARROW * proof.radius
     draw_headings(ax, np.stack([np.zeros(3), proof.worst]), length=size)

@@ -49,6 +49,12 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
     held = [(track, one) for one in actors for _, track in one.held]
     jumps = [line for one in actors for _, line in one.jumps]
     wanted = [(ring, one) for one in missed for ring in one.goal_outlines]
+    fronts, inks = [], []  # from poses to the fronts of bodies, at the start and at the end
+    for one in seen:
+        ahead = np.array([[0.0, 0.0], [FRONT * max(ring[:, 0].max() for ring in one.body), 0.0]])
+        ends = one.mover.pose_at(np.array([one.mover.start_time, one.mover.arrival]))[:, :3]
+        fronts += [SE2(pose).act(ahead) for pose in ends]
+        inks += [one.color, (1.0, 1.0, 1.0) if one.mover.reached else one.color]
     artists: dict[str, Any] = {
         "paths": LineCollection(
             [one.track.pose[:, :2] for one in driving], colors=[one.color for one in driving],
@@ -60,7 +66,7 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
         ),
         "goals": _bodies([(one, one.mover.arrival) for one in seen if one not in missed], face=1.0),
         "missing": _bodies([(one, one.mover.arrival) for one in missed], hatch=HATCH, width=1.0),
-        "fronts": _fronts(seen),
+        "fronts": LineCollection(fronts, linewidths=1.2, colors=inks, zorder=3.7),
         "wanted": PolyCollection(
             [ring for ring, _ in wanted], facecolors="none", linewidths=1.0, linestyles=[DASHES],
             edgecolors=[one.color for _, one in wanted], zorder=2.2,
@@ -154,18 +160,6 @@ def _bodies(
             "zorder": 2.4 if face else 3.8,
         }
     return PolyCollection([ring for ring, _ in rows], linewidths=width, **look)
-
-
-def _fronts(seen: Sequence[Actor]) -> LineCollection:
-    """Lines from the poses of bodies to their fronts, at the start and at the end."""
-    lines, colors = [], []
-    for one in seen:
-        ahead = max(float(ring[:, 0].max()) for ring in one.body)
-        for time in (one.mover.start_time, one.mover.arrival):
-            pose = one.mover.pose_at(time)
-            lines.append(SE2(pose[:3]).act(np.array([[0.0, 0.0], [FRONT * ahead, 0.0]])))
-        colors += [one.color, (1.0, 1.0, 1.0) if one.mover.reached else one.color]
-    return LineCollection(lines, linewidths=1.2, colors=colors, zorder=3.7)
 
 
 def _marks(

@@ -28,6 +28,7 @@ from maneuver_automaton.fleet import FleetLog, simulate_fleet
 from maneuver_automaton.formats.commonroad import read_commonroad
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import films as film
+from maneuver_automaton.plotting import pictures
 from maneuver_automaton.problem import Bounds
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.recording import recording_of
@@ -153,7 +154,7 @@ def drawn(save: Callable[[Path], None]) -> Figure:
     seen: list[Figure] = []
     with (
         tempfile.TemporaryDirectory() as folder,
-        mock.patch.object(Figure, "savefig", lambda figure, *_, **__: seen.append(figure)),
+        mock.patch.object(pictures, "write_figure", lambda figure, _: seen.append(figure)),
     ):
         save(Path(folder) / "picture.png")
     (figure,) = seen

@@ -15,7 +15,7 @@ from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import Look, draw_plane, figure_of, save_picture
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.pages import DPI
+from maneuver_automaton.plotting.pages import DPI, write_figure
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
@@ -199,6 +199,13 @@ class TestPages:
         axes, _ = boxes_of(figure)
         plane, *over_time = (box.height / figure.dpi for box in axes)
         assert plane < 2.0 < plane + min(over_time)
+
+    def test_a_png_has_the_pixels_that_were_drawn_and_their_density(self, tmp_path):
+        figure = figure_of(parking_plan())
+        write_figure(figure, tmp_path / "plan.png")
+        with Image.open(tmp_path / "plan.png") as read:
+            assert read.info["dpi"] == pytest.approx((DPI, DPI), abs=0.01)
+            assert np.array_equal(read, np.asarray(figure.canvas.buffer_rgba())[..., :3])
 
     def test_a_polished_motion_is_never_called_polished_alone(self):
         plan = parking_plan()
