@@ -90,20 +90,19 @@ def _gif(film: Film) -> bytes:
     canvas.draw()
     still = canvas.copy_from_bbox(film.figure.bbox)
 
-    def picture(time: float) -> Array:
+    def picture(time: float) -> Image.Image:
         canvas.restore_region(still)
         film.show(time)
         for artist in film.moving:
             film.figure.draw_artist(artist)
-        return np.array(canvas.buffer_rgba())[..., :3]
+        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
     # one palette for all, so that what does not move does not flicker
-    samples = np.concatenate([picture(time) for time in list(film.samples)[:MOST_SAMPLES]])
+    samples = np.concatenate([np.asarray(picture(time)) for time in film.samples[:MOST_SAMPLES]])
     palette = Image.fromarray(samples).quantize(colors=PALETTE)
     palette.putpalette(_with_white(palette.getpalette() or []))
     images = [
-        Image.fromarray(picture(time)).quantize(palette=palette, dither=Image.Dither.NONE)
-        for time in film.times
+        picture(time).quantize(palette=palette, dither=Image.Dither.NONE) for time in film.times
     ]
     lasts = [round(1000.0 / FRAMES_PER_SECOND)] * (len(images) - 1) + [round(1000.0 * PAUSE_S)]
     stream = io.BytesIO()
