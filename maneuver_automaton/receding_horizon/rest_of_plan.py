@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import MOST
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of
 from maneuver_automaton.budget import UNLIMITED
@@ -113,11 +115,9 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
 
     Source: the paper, Sec. 4.2 (rest to the end) and 5.1 (greatest cost first).
     """
-    twists = [trim.body_velocity.tolist() for trim in plan.trims]
-    moving = [k for k, twist in enumerate(twists) if any(twist)]
-    rests_last = moving == list(range(len(moving)))
-    if rests_last and not any(map(commute, twists, twists[1 : len(moving)])):
-        return plan  # no neighbours commute
+    twists, moving, is_sole = _orders(plan.trims)
+    if is_sole:
+        return plan
     order: list[int] = []
     block: list[int] = []
     costly: list[float] = (-rates).tolist()
@@ -132,6 +132,16 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
         return plan
     word, times = merged([plan.trims[k] for k in order], plan.durations[order].tolist())
     return Plan.of_parts(plan.start, word, times, start_time=plan.start_time)
+
+
+@functools.lru_cache(maxsize=MOST)
+def _orders(trims: tuple[Trim, ...]) -> tuple[list[list[float]], list[int], bool]:
+    """Twists, places of those that move, and whether rest is last and no neighbours commute."""
+    twists = [trim.body_velocity.tolist() for trim in trims]
+    moving = [k for k, twist in enumerate(twists) if any(twist)]
+    rests_last = moving == list(range(len(moving)))
+    fixed = rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
+    return twists, moving, fixed
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
