@@ -157,7 +157,6 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
 NEAR = 1e-9  # [m, rad] a plan that ends so close to the goal leads there
-FIRST = 1  # of the cheapest connections to each
 EASED = 0.5  # share of a goal's tolerance that may be given up before the end
 
 
@@ -277,9 +276,7 @@ def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:
         yield Plan(problem.start, (), durations=[], start_time=problem.start_time)
         return
     small = sub_library(setup)
-    solutions = search_setup_words(
-        problem, small, alternatives=FIRST - 1, budget=UNLIMITED, spare=True
-    )
+    solutions = search_setup_words(problem, small, alternatives=0, budget=UNLIMITED, spare=True)
     for solution in solutions:
         yield plan_of(problem, solution)
 
@@ -288,15 +285,12 @@ def _in_time(
     problem: Problem, trims: tuple[Trim, ...], times: list[float], pad: Trim | None
 ) -> Plan | None:
     """A plan that rests for the remainder of a fixed time; None if it takes longer."""
-    spent = math.fsum(times)
-    total = problem.horizon.time
-    limit = total if total is not None else problem.horizon.max_time
-    if limit is not None and spent > limit + 1e-9:
+    total, longest, spent = problem.horizon.time, problem.horizon.max_time, math.fsum(times)
+    left = (math.inf if longest is None else longest) - spent if total is None else total - spent
+    if left < -1e-9 or (total is not None and left > 1e-9 and pad is None):
         return None
-    if total is not None and total - spent > 1e-9:
-        if pad is None:
-            return None
-        trims, times = (*trims, pad), [*times, total - spent]
+    if total is not None and pad is not None and left > 1e-9:
+        trims, times = (*trims, pad), [*times, left]
     word, durations = merged(trims, times)
     return Plan(problem.start, word, durations=durations, start_time=problem.start_time)
 
