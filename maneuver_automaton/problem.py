@@ -535,16 +535,7 @@ class Problem:
 
     def rates_of_trims(self, trims: Sequence[Trim]) -> Array:
         """Cost per second (n,) of some trims, which may be others than the library's."""
-        if not trims:
-            return np.zeros(0)
-        known, rates = _known_rates(self.automaton, self.cost), list[float]()
-        for trim in trims:
-            entry = known.get(trim.name)
-            if entry is None or entry[0] is not trim:
-                controls = np.array([one.control for one in trims])
-                return self.cost.rates(controls, np.array([one.body_velocity for one in trims]))
-            rates.append(entry[1])
-        return np.array(rates)
+        return _rates_of_trims(self.automaton, self.cost, tuple(trims)).copy()
 
     def cost_of(self, plan: Plan) -> float:
         """Cost of a plan of any primitives: `invariant_cost_of`, and what places cost."""
@@ -846,20 +837,29 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 
 @kept_by_first
-def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
+def _rates_of_trims(automaton: Automaton, cost: StageCost, trims: tuple[Trim, ...]) -> Array:
+    known = _known_rates(automaton, cost)
+    if all(trim in known for trim in trims):
+        return np.array([known[trim] for trim in trims])
+    controls = np.array([one.control for one in trims])
+    return cost.rates(controls, np.array([one.body_velocity for one in trims]))
+
+
+@kept_by_first
+def _known_rates(automaton: Automaton, cost: StageCost) -> dict[Trim, float]:
     rates = np.asarray(cost.rates(automaton.controls, automaton.body_velocities))
     if rates.shape != (len(automaton),):
         raise ValueError(
             f"cost: the rates of {len(automaton)} trims have shape {rates.shape}, need "
             f"({len(automaton)},)"
         )
-    known = dict(zip(automaton.trim_names, rates.tolist(), strict=True))
-    wrong = next((name for name, rate in known.items() if not 0.0 <= rate < math.inf), None)
-    if wrong is not None:
-        raise ValueError(
-            f"cost: trim {wrong!r} costs {known[wrong]:g} per second, need a number of at least 0"
-        )
-    return {trim.name: (trim, known[trim.name]) for trim in automaton.trims}
+    known = dict(zip(automaton.trims, rates.tolist(), strict=True))
+    for trim, rate in known.items():
+        if not 0.0 <= rate < math.inf:
+            raise ValueError(
+                f"cost: trim {trim.name!r} costs {rate:g} per second, need a number of at least 0"
+            )
+    return known
 
 
 def _as_vias(value: Any) -> tuple[Via, ...]:

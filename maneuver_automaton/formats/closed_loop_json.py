@@ -445,7 +445,7 @@ def _outcome_of(row: Mapping[str, Any]) -> Outcome:
         tuple((one["step"], made(Violation, one, BrokenEntry)) for one in row.get(key, ()))
         for key in ("broken_guarantees", "disturbed")
     )
-    failed = {step for step, one in broken if one.guarantee is Guarantee.NO_COLLISION}
+    failed = {n for n, one in (*broken, *disturbed) if one.guarantee is Guarantee.NO_COLLISION}
     return made(
         Outcome,
         row,

@@ -264,11 +264,23 @@ class RecedingHorizon:
             trim=None if last is None or self.problem.start_state is None else trim,
             state=known if last is None else None,
         )
-        now, search = _started(
+        # Limits that the vehicle breaks already are replaced by those that it keeps.
+        kind: type[StepSearch] = AmongObstacles if here.obstacles else InFreeSpace
+        said = ""
+        if needs_maneuvers(here):
+            kind = OverManeuvers
+            if here.margin and here.obstacles and here.start.size == 3:
+                here, said = within_its_margin(here)
+        elif here.obstacles:
+            here, said = as_it_stands(here)
+        now = Situation(
             self.settings, here, last, passed=driven, budget=budget, changed=changed, state=known
         )
+        if said:
+            now.flag(Guarantee.SAFETY, said)
         if self.proven is not None:
             now.bound = self._known(now)
+        search = kind(now)
         step = self._logged(search.decide(), search, now)
         self.last = replace(step, passed=tuple(passed)) if passed else step
         control = self.last.control
@@ -405,32 +417,6 @@ def _decision(chosen: StepPlan, now: Situation, *, same: bool) -> Decision:
     if chosen.origin is not Origin.SEARCHED:
         return Decision.KEPT
     return Decision.IMPROVED if same and now.last.decision.leads else Decision.REPLANNED
-
-
-def _started(
-    settings: Settings,
-    here: Problem,
-    last: Step | None,
-    *,
-    passed: float,
-    budget: Budget,
-    changed: bool,
-    state: Array | None,
-) -> tuple[Situation, StepSearch]:
-    """A step under way, and where its plans come from; the parameters are those of `Situation`."""
-    maneuvers, broken = needs_maneuvers(here), ""
-    if maneuvers and here.margin and here.obstacles and here.start.size == 3:
-        here, broken = within_its_margin(here)
-    elif not maneuvers and here.obstacles:
-        here, broken = as_it_stands(here)
-    now = Situation(
-        settings, here, last, passed=passed, budget=budget, changed=changed, state=state
-    )
-    if broken:
-        now.flag(Guarantee.SAFETY, broken)
-    if maneuvers:
-        return now, OverManeuvers(now)
-    return now, AmongObstacles(now) if here.obstacles else InFreeSpace(now)
 
 
 def load_search(problem: Problem) -> None:

@@ -22,7 +22,7 @@ from maneuver_automaton.receding_horizon.log import first_part
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, merged
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.search._kernels_nodes import EMPTY
-from maneuver_automaton.search.arrays import LatticeArrays, Scene
+from maneuver_automaton.search.arrays import LatticeArrays
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.words.library import NO_TRIM
 
@@ -88,7 +88,11 @@ def search_fail_safe(
         trims = (query.automaton.trims[rest],)
         stood = Plan(problem.start, trims, durations=[until - at], start_time=at)
         return FailSafe(plan=stood, free_until=until if free else at, complete=free, expansions=0)
-    task, scene = _task(query, until), _scene(query)
+    task, scene = _task(query, until), query.around
+    if problem.bounds.x is None and problem.bounds.y is None:  # motions may lead anywhere
+        window, edge_window = scene.window.copy(), scene.edge_window.copy()
+        window[:4] = edge_window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
+        scene = scene._replace(window=window, edge_window=edge_window)
     for library in _libraries(query, task):
         search = _arrays(MOST_NODES)
         kernels.begin(task, library, scene, search)
@@ -148,15 +152,6 @@ def _libraries(query: LatticeQuery, task: kernels.FailSafeTask) -> Iterator[Latt
         longest = np.where(turns, numbered.longest, np.minimum(numbered.longest, task.longest))
         yield arrays._replace(library=numbered._replace(longest=longest))
     yield arrays
-
-
-def _scene(query: LatticeQuery) -> Scene:
-    """What motions are tested against; without bounds they may lead anywhere."""
-    if not (query.problem.bounds.x is None and query.problem.bounds.y is None):
-        return query.around
-    window, edge_window = query.around.window.copy(), query.around.edge_window.copy()
-    window[:4] = edge_window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
-    return query.around._replace(window=window, edge_window=edge_window)
 
 
 def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:

@@ -236,14 +236,10 @@ class LoopBounds:
         proven = in_costs(here, best) if best > 0.0 else 0.0
         return max(proven, self.least - (accumulated - self.at))
 
-    def closed(self, value: float, bound: float) -> bool:
-        """Whether a value is near enough to a bound."""
-        return value < math.inf and value - bound <= self.gap * value
-
     def prove(self, here: Problem, value: float, accumulated: float, budget: Budget) -> float:
         """A better bound than that known, in the time that is left of a step."""
         known = self.known(here, accumulated)
-        if value == math.inf or self.closed(value, known) or budget.is_over:
+        if value == math.inf or value - known <= self.gap * value or budget.is_over:
             return known
         watch = Watch(gap=self.gap, cost=value, bound=known)
         proving = Proving(here, budget, watch)
@@ -254,10 +250,6 @@ class LoopBounds:
             if not function.priced:  # what a change between two steps costs is not counted
                 self.finest, self.since = function, accumulated
         best = max(known, proving.bound(value).value)
-        self._note(here, best, accumulated)
+        if not prices_switches(here.cost) and here.horizon.time is None:  # for steps on the way
+            self.least, self.at = best, accumulated
         return best
-
-    def _note(self, here: Problem, least: float, accumulated: float) -> None:
-        """Keep a bound of plans from here, for steps on the way."""
-        if not prices_switches(here.cost) and here.horizon.time is None:
-            self.least, self.at = least, accumulated

@@ -175,9 +175,10 @@ class ClosedLoop(Played):
     @property
     def collisions(self) -> Iterator[tuple[int, Violation]]:
         """Number of the step, and the obstacle it hit, by the audit."""
-        for number, violation in self.violations:
-            if violation.guarantee is Guarantee.NO_COLLISION:
-                yield number, violation
+        for step in self.steps:
+            for violation in (*step.violations, *step.disturbed):
+                if violation.guarantee is Guarantee.NO_COLLISION:
+                    yield step.number, violation
 
     @property
     def violations(self) -> Iterator[tuple[int, Violation]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import MOST
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of
 from maneuver_automaton.budget import UNLIMITED
@@ -113,11 +115,9 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
 
     Source: the paper, Sec. 4.2 (rest to the end) and 5.1 (greatest cost first).
     """
-    twists = [trim.body_velocity.tolist() for trim in plan.trims]
-    moving = [k for k, twist in enumerate(twists) if any(twist)]
-    rests_last = moving == list(range(len(moving)))
-    if rests_last and not any(map(commute, twists, twists[1 : len(moving)])):
-        return plan  # no neighbours commute
+    twists, moving, is_sole = _orders(plan.trims)
+    if is_sole:
+        return plan
     order: list[int] = []
     block: list[int] = []
     costly: list[float] = (-rates).tolist()
@@ -134,6 +134,16 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     return Plan.of_parts(plan.start, word, times, start_time=plan.start_time)
 
 
+@functools.lru_cache(maxsize=MOST)
+def _orders(trims: tuple[Trim, ...]) -> tuple[list[list[float]], list[int], bool]:
+    """Twists, places of those that move, and whether rest is last and no neighbours commute."""
+    twists = [trim.body_velocity.tolist() for trim in trims]
+    moving = [k for k, twist in enumerate(twists) if any(twist)]
+    rests_last = moving == list(range(len(moving)))
+    fixed = rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
+    return twists, moving, fixed
+
+
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
     """Whether two twists commute: their Lie bracket is zero."""
     bracket = max(
@@ -147,7 +157,6 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
 NEAR = 1e-9  # [m, rad] a plan that ends so close to the goal leads there
-FIRST = 1  # of the cheapest connections to each
 EASED = 0.5  # share of a goal's tolerance that may be given up before the end
 
 
@@ -267,9 +276,7 @@ def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:
         yield Plan(problem.start, (), durations=[], start_time=problem.start_time)
         return
     small = sub_library(setup)
-    solutions = search_setup_words(
-        problem, small, alternatives=FIRST - 1, budget=UNLIMITED, spare=True
-    )
+    solutions = search_setup_words(problem, small, alternatives=0, budget=UNLIMITED, spare=True)
     for solution in solutions:
         yield plan_of(problem, solution)
 
@@ -278,15 +285,12 @@ def _in_time(
     problem: Problem, trims: tuple[Trim, ...], times: list[float], pad: Trim | None
 ) -> Plan | None:
     """A plan that rests for the remainder of a fixed time; None if it takes longer."""
-    spent = math.fsum(times)
-    total = problem.horizon.time
-    limit = total if total is not None else problem.horizon.max_time
-    if limit is not None and spent > limit + 1e-9:
+    total, longest, spent = problem.horizon.time, problem.horizon.max_time, math.fsum(times)
+    left = (math.inf if longest is None else longest) - spent if total is None else total - spent
+    if left < -1e-9 or (total is not None and left > 1e-9 and pad is None):
         return None
-    if total is not None and total - spent > 1e-9:
-        if pad is None:
-            return None
-        trims, times = (*trims, pad), [*times, total - spent]
+    if total is not None and pad is not None and left > 1e-9:
+        trims, times = (*trims, pad), [*times, left]
     word, durations = merged(trims, times)
     return Plan(problem.start, word, durations=durations, start_time=problem.start_time)
 

@@ -334,7 +334,7 @@ class _Track:
             self.audits.append(_audited(self.problem, piece))
             same = self.driven[-1] is piece
             real = self.audits[-1] if same else _audited(self.problem, self.driven[-1])
-            self.log[-1] = _judged(now, real)
+            self.log[-1] = _judged(self.problem, now, real)
         self.passed = going_on(self.problem, self.passed, self.driven[-1])
         self.log[-1] = replace(self.log[-1], passed=self.passed)
 
@@ -436,10 +436,19 @@ def _audited(problem: Problem, piece: Plan) -> Audit:
     )
 
 
-def _judged(now: Step, driven: Audit) -> Step:
-    """The step with the clearance of the driven motion; a collision is flagged."""
-    clearance = driven.min_clearance_m
-    if clearance is None or clearance > too_close(0.0):
-        return replace(now, clearance_m=clearance)
+def _judged(problem: Problem, now: Step, driven: Audit) -> Step:
+    """The step with the clearance of the driven motion; a collision is flagged.
+
+    It is a disturbance's where the motion that was decided on is free.
+    """
+    now = replace(now, clearance_m=driven.min_clearance_m)
+    if _is_clear(driven):
+        return now
     hit = Violation(guarantee=Guarantee.NO_COLLISION, reason=driven.reason.split("; ")[-1])
-    return replace(now, clearance_m=clearance, violations=(*now.violations, hit))
+    if _is_clear(_audited(problem, now.piece)):
+        return replace(now, disturbed=(*now.disturbed, hit))
+    return replace(now, violations=(*now.violations, hit))
+
+
+def _is_clear(driven: Audit) -> bool:
+    return driven.min_clearance_m is None or driven.min_clearance_m > too_close(0.0)

@@ -48,8 +48,8 @@ class Outcome:
     @property
     def collisions(self) -> tuple[int, ...]:
         """Numbers of the steps that hit an obstacle, by the audit."""
-        hits = (step for step, one in self.violations if one.guarantee is Guarantee.NO_COLLISION)
-        return tuple(hits)
+        told = (*self.violations, *self.disturbed)
+        return tuple(step for step, one in told if one.guarantee is Guarantee.NO_COLLISION)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

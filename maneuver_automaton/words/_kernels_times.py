@@ -13,7 +13,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import by_value, inner_kernel
-from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
+from maneuver_automaton.groups._kernels import coast, nearest_turn
 
 
 @by_value
@@ -56,10 +56,11 @@ def end_and_columns(twists: Array, times: Array, columns: Array) -> tuple[float,
     # A trim that lasts longer turns all that follows about its own instantaneous centre:
     # column i is ``(R v_i + w_i J (end - p_i), w_i)`` in the world, p_i any point of trim i.
     n = times.size
-    x, y, heading = 0.0, 0.0, 0.0
+    x, y, heading, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
     for i in range(n):
         dx, dy, turn = coast(twists[i, 0], twists[i, 1], twists[i, 2], times[i])
-        x, y, heading = compose(x, y, heading, dx, dy, turn)
+        # What `compose` does, which would take the cosine and the sine of the last trim again.
+        x, y, heading = x + c * dx - s * dy, y + s * dx + c * dy, heading + turn
         c, s = math.cos(heading), math.sin(heading)
         # Velocity of the world's origin if all turned with this trim: its last pose does for `p_i`,
         # as every pose of the trim lies on the same motion. The end is known only after the last
@@ -93,19 +94,22 @@ def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple
 
     Householder QR with column pivoting (Golub, Van Loan, Matrix Computations, Alg. 5.4.1).
     """
+    # Each loop over columns is the innermost one, so that the processor takes several at once, with
+    # indices that cannot be negative, which it would ask of each.
     m, n = matrix.shape
-    order, rank, largest = np.arange(n), 0, 0.0
+    order, rank, largest, room = np.arange(n), 0, 0.0, np.zeros((2, n))
+    squares, factors, end = room[0], room[1], np.uint64(n)
+    for i in range(m):
+        for j in range(n):
+            squares[j] += matrix[i, j] * matrix[i, j]
     for k in range(min(m, n)):
         # The longest column that is left comes next: the rank is how many are longer than the
         # tolerance of the longest of all, so words whose columns do not span are solved like any
         # other.
         best, best_norm = k, -1.0
         for j in range(k, n):
-            norm = 0.0
-            for i in range(k, m):
-                norm += matrix[i, j] * matrix[i, j]
-            if norm > best_norm:
-                best, best_norm = j, norm
+            if squares[j] > best_norm:
+                best, best_norm = j, squares[j]
         best_norm = math.sqrt(best_norm)
         largest = max(largest, best_norm)
         if best_norm <= relative_tolerance * largest or best_norm == 0.0:
@@ -118,25 +122,28 @@ def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple
         # The sign that adds in `head - alpha`, so that no digit cancels.
         alpha = -best_norm if head >= 0.0 else best_norm
         v0 = head - alpha
-        scale = 0.0
+        scale, dot, after = 0.0, v0 * rhs[k], np.uint64(k + 1)
+        for j in range(after, end):
+            factors[j] = v0 * matrix[k, j]
         for i in range(k + 1, m):
-            scale += matrix[i, k] * matrix[i, k]
+            v = matrix[i, k]
+            scale += v * v
+            dot += v * rhs[i]
+            for j in range(after, end):
+                factors[j] += v * matrix[i, j]
         scale = v0 * v0 + scale
-        for j in range(k + 1, n):
-            dot = v0 * matrix[k, j]
-            for i in range(k + 1, m):
-                dot += matrix[i, k] * matrix[i, j]
-            factor = 2.0 * dot / scale
-            matrix[k, j] -= factor * v0
-            for i in range(k + 1, m):
-                matrix[i, j] -= factor * matrix[i, k]
-        dot = v0 * rhs[k]
-        for i in range(k + 1, m):
-            dot += matrix[i, k] * rhs[i]
         factor = 2.0 * dot / scale
         rhs[k] -= factor * v0
+        for j in range(after, end):
+            factors[j] = 2.0 * factors[j] / scale
+            matrix[k, j] -= factors[j] * v0
+            squares[j] = 0.0
         for i in range(k + 1, m):
-            rhs[i] -= factor * matrix[i, k]
+            v = matrix[i, k]
+            rhs[i] -= factor * v
+            for j in range(after, end):
+                matrix[i, j] -= factors[j] * v
+                squares[j] += matrix[i, j] * matrix[i, j]
         matrix[k, k] = alpha
         rank += 1
     # The basic solution: columns beyond the rank are not used.

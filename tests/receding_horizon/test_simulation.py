@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
@@ -20,6 +21,7 @@ from maneuver_automaton.receding_horizon import (
     simulate,
     within,
 )
+from maneuver_automaton.receding_horizon.statistics import outcome_of
 from maneuver_automaton.scenario import load_scenario
 from tests.receding_horizon.loops import (
     EFFORT,
@@ -256,6 +258,22 @@ class TestDisturbances:
         twist = loop.driven[0].trims[0].body_velocity
         planned = loop.steps[0].plan.trims[0].body_velocity
         assert twist.tolist() == pytest.approx((planned * [0.9, 1.0, 1.1]).tolist())
+
+    @pytest.mark.parametrize(("aside", "hits"), [(0.3, 0), (1.0, 1)])
+    def test_a_collision_that_it_makes_alone_is_no_breach(self, aside, hits):
+        # it drives beside what it plans, and knows a step later
+        problem = Problem(
+            robot({"rest": (0.0, 0.0), "ahead": (1.0, 0.0), "spin": (0.0, 1.0)}),
+            [0.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            obstacles=Box([1.0, 0.5], center=[1.5, 1.0]),
+        )
+        upset = Disturbance(delay=1, pushes={0: (-0.2, aside, 0.0)})
+        loop = simulate(problem, step=1.0, steps=2, disturbance=upset)
+        assert len(loop.steps) == 2
+        assert list(loop.violations) == []
+        assert len(list(loop.collisions)) == len(list(loop.disturbed)) == hits
+        assert len(outcome_of(loop).collisions) == hits
 
     def test_a_step_late_the_push_is_seen_a_step_later(self):
         upset = Disturbance(delay=1, pushes={0: (0.1, 0.1, 0.1)})
