@@ -25,6 +25,7 @@ from maneuver_automaton.collision.convex import Solids
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which clearances to sharp corners are made exact
 NEGLIGIBLE = 1e-7  # [m] no rounding is as large
+LISTED = 1.5  # reaches of the buckets, as far as which they list solids
 ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passed over
 
 
