@@ -14,6 +14,7 @@ from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import (
     LISTED,
     bucket_of,
+    rows_from,
     separation,
     square_to_plate,
 )
@@ -152,7 +153,7 @@ def not_parted(
     if k < 0:
         return FREE
     n_pieces = body.first.shape[0] - 1
-    for item in range(buckets.start[k], buckets.start[k + 1]):
+    for item in rows_from(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
         if square_to_plate(solids, p, m_x, m_y) >= reach * reach:
             continue
