@@ -90,7 +90,7 @@ def free_of_static(
         # The order of the tests: the field, a few look-ups, decides most poses in the open. Solids
         # are asked where it does not.
         place = Place(p_x, p_y, c, s)
-        clearance = field_bound(world.field, body, place)
+        clearance = field_bound(world.field, body, place, keep + near)
         if clearance > keep + near:
             nearest = clearance - keep
             # The proof of this step: no point of the body is faster than `speed`, so none comes

@@ -8,6 +8,9 @@ offset.
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
@@ -25,7 +28,14 @@ from maneuver_automaton.collision.convex import Solids
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which clearances to sharp corners are made exact
 NEGLIGIBLE = 1e-7  # [m] no rounding is as large
+LISTED = 1.5  # reaches of the buckets, as far as which they list solids
 ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passed over
+
+
+@bare_inner_kernel
+def rows_from(first: int, end: int) -> range:
+    """Rows from one on and to before another, unsigned: no index is asked if it is negative."""
+    return range(np.uintp(first), np.uintp(end))
 
 
 @bare_inner_kernel
@@ -53,11 +63,11 @@ def separation(
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     if p_1 - p_0 > 1:
-        for k in range(p_0, p_1):  # edges of the solid against corners of the body
+        for k in rows_from(p_0, p_1):  # edges of the solid against corners of the body
             n_x, n_y = solids.edges[k, 2], solids.edges[k, 3]
             m_x, m_y = c * n_x + s * n_y, c * n_y - s * n_x  # the normal seen from the body
             least = math.inf
-            for j in range(b_0, b_1):
+            for j in rows_from(b_0, b_1):
                 value = m_x * body.edges[j, 0] + m_y * body.edges[j, 1]
                 least = min(least, value)
             apart = least + n_x * x + n_y * y - solids.edges[k, 4]
@@ -68,11 +78,11 @@ def separation(
     # The body's own normals only where those of the solid have not shown enough: most solids that
     # are looked at are walls, whose normals decide.
     if b_1 - b_0 > 1 and best <= enough:
-        for k in range(b_0, b_1):  # edges of the body against corners of the solid
+        for k in rows_from(b_0, b_1):  # edges of the body against corners of the solid
             n_x = c * body.edges[k, 2] - s * body.edges[k, 3]
             n_y = s * body.edges[k, 2] + c * body.edges[k, 3]
             least = math.inf
-            for j in range(p_0, p_1):
+            for j in rows_from(p_0, p_1):
                 value = n_x * solids.edges[j, 0] + n_y * solids.edges[j, 1]
                 least = min(least, value)
             apart = least - n_x * x - n_y * y - body.edges[k, 4]
@@ -100,9 +110,9 @@ def core_distance(
     # corner may be farther from all of the other one than the nearest so far: it is passed over.
     top, low = -math.inf, math.inf  # of the solid, and of the body over the pose
     m_x, m_y = c * n_x + s * n_y, c * n_y - s * n_x
-    for j in range(p_0, p_1):
+    for j in rows_from(p_0, p_1):
         top = max(top, n_x * (solids.edges[j, 0] - x) + n_y * (solids.edges[j, 1] - y))
-    for j in range(b_0, b_1):
+    for j in rows_from(b_0, b_1):
         height = m_x * body.edges[j, 0] + m_y * body.edges[j, 1]
         low = min(low, height)
         away = max(height - top - NEGLIGIBLE, 0.0)
@@ -110,20 +120,20 @@ def core_distance(
             continue
         at_x = x + c * body.edges[j, 0] - s * body.edges[j, 1]
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
-        before = p_1 - 1
-        for k in range(p_0, p_1):
+        before: Any = np.uintp(p_1 - 1)
+        for k in rows_from(p_0, p_1):
             e_x, e_y = from_segment(at_x, at_y, solids.edges, before, k)
             if e_x * e_x + e_y * e_y < best:
                 best, axis_x, axis_y = e_x * e_x + e_y * e_y, e_x, e_y
             before = k
-    for j in range(p_0, p_1):
+    for j in rows_from(p_0, p_1):
         d_x, d_y = solids.edges[j, 0] - x, solids.edges[j, 1] - y
         away = max(low - n_x * d_x - n_y * d_y - NEGLIGIBLE, 0.0)
         if away * away > best:
             continue
         at_x, at_y = c * d_x + s * d_y, c * d_y - s * d_x
-        before = b_1 - 1
-        for k in range(b_0, b_1):
+        before = np.uintp(b_1 - 1)
+        for k in rows_from(b_0, b_1):
             e_x, e_y = from_segment(at_x, at_y, body.edges, before, k)
             # Here the vector leads from the body to the solid, in the body's frame.
             if e_x * e_x + e_y * e_y < best:
@@ -179,8 +189,9 @@ def field_at(field: Field, body: Body, d: int, place: Place) -> tuple[float, flo
 
 
 @bare_inner_kernel
-def field_bound(field: Field, body: Body, place: Place) -> float:
+def field_bound(field: Field, body: Body, place: Place, least: float) -> float:
     """Lower bound of the clearance from the distances stored at cell centres, by discs."""
+    # Below `least` it is some bound, and not the best one.
     best = math.inf
     for d in range(body.discs.shape[0]):
         # Distance is 1-Lipschitz: less how far the disc's middle is from that of the cell it is a
@@ -189,6 +200,8 @@ def field_bound(field: Field, body: Body, place: Place) -> float:
         known, e_x, e_y = field_at(field, body, d, place)
         away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
         best = min(best, known - away - body.discs[d, 2])
+        if best <= least:
+            break
     return best
 
 
@@ -235,7 +248,7 @@ def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, mo
     k = bucket_of(buckets, m_x, m_y)
     if k < 0:
         return best
-    for item in range(buckets.start[k], buckets.start[k + 1]):
+    for item in rows_from(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
         # The upright box around a solid against the disc around the body: what cannot be nearer
         # than the nearest so far is passed over before any axis is computed.
@@ -305,14 +318,14 @@ def axis_time(
     lowest = math.inf
     b_0, b_1 = body.first[b], body.first[b + 1]
     m_x, m_y = c * axis_x + s * axis_y, c * axis_y - s * axis_x
-    for k in range(b_0, b_1):
+    for k in rows_from(b_0, b_1):
         lowest = min(lowest, m_x * body.edges[k, 0] + m_y * body.edges[k, 1])
     # The clearance along a fixed axis is the height of the lowest corner over the solid. As long as
     # no corner is lower by more than `drop` than the lowest is now, the clearance is less than now
     # by `drop` at most.
     limit = lowest - drop  # heights are counted from the pose
     time = math.inf
-    for k in range(b_0, b_1):
+    for k in rows_from(b_0, b_1):
         u_x = c * body.edges[k, 0] - s * body.edges[k, 1]
         u_y = s * body.edges[k, 0] + c * body.edges[k, 1]
         if turn == 0.0:
@@ -323,7 +336,7 @@ def axis_time(
             height = axis_x * (center_x - x) + axis_y * (center_y - y)
             a, b_side = axis_x * w_x + axis_y * w_y, axis_x * w_y - axis_y * w_x
             # Most corners are too high to come down in time: a look at how fast each falls says so.
-            if stays_above(a, b_side, height, turn, limit, most):
+            if stays_above(a, b_side, height, turn, limit, min(most, time)):
                 continue
             t = corner_time(a, b_side, height, turn, limit)
         time = min(time, t)
@@ -364,7 +377,7 @@ def near_step(
     k = bucket_of(buckets, m_x, m_y)
     if k < 0:
         return min(step, most), nearest
-    for item in range(buckets.start[k], buckets.start[k + 1]):
+    for item in rows_from(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
         # A solid further away than this cannot shorten the step: it is passed over before any axis.
         away = step * speed + keep + body.reach
@@ -397,7 +410,7 @@ def near_step(
 def static_clearance(world: WorldArrays, body: Body, place: Place) -> float:
     """Lower bound of the clearance to all static obstacles, at most the field's reach."""
     near = max(NEAR * body.reach, 0.25 * world.field.cell)
-    bound = field_bound(world.field, body, place)
+    bound = field_bound(world.field, body, place, -math.inf)
     if bound <= near:
         exact = near_clearance(world, body, place, near, math.inf)
         bound = exact if exact <= 0.0 else max(bound, exact)

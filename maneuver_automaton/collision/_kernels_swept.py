@@ -11,7 +11,13 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
-from maneuver_automaton.collision._kernels_clearance import bucket_of, separation, square_to_plate
+from maneuver_automaton.collision._kernels_clearance import (
+    LISTED,
+    bucket_of,
+    rows_from,
+    separation,
+    square_to_plate,
+)
 from maneuver_automaton.collision.arrays import Place, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
 
@@ -139,22 +145,15 @@ def not_parted(
     # the buckets all solids within `reach`, and along an axis each is farther than `enough`.
     buckets, solids = world.buckets, world.solids
     reach = swept.places[motion, 2] + enough
-    if not reach < math.inf:
-        return UNKNOWN
     m_x = x + c * swept.places[motion, 0] - s * swept.places[motion, 1]
     m_y = y + s * swept.places[motion, 0] + c * swept.places[motion, 1]
-    known = body.reach + buckets.reach
-    k = bucket_of(buckets, m_x, m_y)
-    if reach > known and k >= 0:  # so far from any place of the bucket, farther from its middle
-        i, j = (m_x - buckets.origin_x) / buckets.cell, (m_y - buckets.origin_y) / buckets.cell
-        i, j = i - math.floor(i), j - math.floor(j)
-        known += buckets.cell * min(min(i, 1.0 - i), min(j, 1.0 - j)) - SHORT
-    if reach > known:
+    if reach > body.reach + LISTED * buckets.reach:
         return UNKNOWN
+    k = bucket_of(buckets, m_x, m_y)
     if k < 0:
         return FREE
     n_pieces = body.first.shape[0] - 1
-    for item in range(buckets.start[k], buckets.start[k + 1]):
+    for item in rows_from(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
         if square_to_plate(solids, p, m_x, m_y) >= reach * reach:
             continue

@@ -15,6 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import FEW, Array, wrapped
 from maneuver_automaton.collision import _kernels_field, _kernels_slabs
+from maneuver_automaton.collision._kernels_clearance import LISTED
 from maneuver_automaton.collision.arrays import (
     Buckets,
     Field,
@@ -271,10 +272,10 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     if not len(plates):
         empty = np.zeros(1, dtype=np.int64)
         return Buckets(empty, empty[:0], 0.0, 0.0, 1.0, 0, 0, math.inf)
-    around = body.reach + reach
+    around = body.reach + LISTED * reach
     low, high = plates[:, :2].min(axis=0) - around, plates[:, 2:4].max(axis=0) + around
     width = high - low
-    cell = max(0.4 * around, math.sqrt(float(width.prod()) / MOST_BUCKETS))
+    cell = max(0.35 * around, math.sqrt(float(width.prod()) / MOST_BUCKETS))
     columns, rows = (int(n) for n in np.ceil(width / cell))
     start = np.zeros(rows * columns + 1, dtype=np.int64)
     where = (float(low[0]), float(low[1]), cell, columns, rows, reach)

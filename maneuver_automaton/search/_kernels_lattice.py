@@ -221,7 +221,7 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
                     least = (cut.back_off + cut.shortest) / lib.parts.fastest[trim]
                     end = coast_end(lib, trim, pose, task.sign * min(t, least))
                 if met == NOTHING_MET:
-                    clearance = field_bound(first.field, lib.parts.body, end)
+                    clearance = field_bound(first.field, lib.parts.body, end, -math.inf)
                     clearance = max(clearance - scene.keep, scene.margin)
                 elif met >= 0 and overlaps(first, lib.parts.body, end, met):
                     free = 0.0

@@ -36,7 +36,7 @@ def distance_within(
     """Distance [m] of a body to what stands around it, exact below `within`, at most that."""
     # The world has to know all that is nearer than `within`, as one does that keeps that distance.
     place = Place(x, y, math.cos(heading), math.sin(heading))
-    if field_bound(world.field, body, place) >= within:
+    if field_bound(world.field, body, place, -math.inf) >= within:
         return within
     # Corners are looked at where a clearance is below `SHARP` times the last argument.
     return max(near_clearance(world, body, place, within / SHARP, within), 0.0)
