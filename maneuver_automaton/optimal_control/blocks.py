@@ -26,8 +26,7 @@ class Kind(NamedTuple):
     hessian: tuple[IntArray, IntArray]  # both variables of each entry, of the upper triangle
     size: int  # number of variables
     given: int  # number of parameters
-    rows: int
-    zero: int  # so many rows, the first ones, must be zero; the others must not be positive
+    limits: Array  # (rows, 2)
     is_priced: bool  # whether it adds to the objective
 
 
@@ -37,6 +36,11 @@ class Blocks(NamedTuple):
     kind: Kind
     variables: IntArray  # (size, n) numbers of variables of the program
     given: Array | IntArray  # (given, n) values, or numbers of parameters of the program
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of all of them."""
+        return len(self.kind.limits) * self.number
 
     @property
     def number(self) -> int:
@@ -60,11 +64,17 @@ def kind_of(
     price: Any = 0.0,
     zero: Any = None,
     below: Any = None,
+    within: Sequence[tuple[Any, float, float]] = (),
 ) -> Kind:
-    """A kind of block from the symbols of one: its price, rows that are zero, or not positive."""
-    none = casadi.SX(0, 1)
-    zero, below = none if zero is None else zero, none if below is None else below
-    price, rows = casadi.SX(price), casadi.vertcat(zero, below)
+    """A kind of block from the symbols of one: its price, and rows.
+
+    Some are zero, some not positive, some `within` a lower and an upper limit.
+    """
+    zero, below = (casadi.SX(0, 1) if some is None else some for some in (zero, below))
+    price, rows = casadi.SX(price), casadi.vertcat(zero, below, *(row for row, *_ in within))
+    limits = np.zeros((rows.shape[0], 2))
+    limits[zero.shape[0] :, 0] = -np.inf
+    limits[rows.shape[0] - len(within) :] = [pair for _, *pair in within] or np.zeros((0, 2))
     of_price, of_rows = casadi.SX.sym("of_price"), casadi.SX.sym("of_rows", rows.shape[0])
     jacobian, weights = casadi.jacobian(rows, variables), (of_price, of_rows)
     lagrangian = of_price * price + casadi.dot(of_rows, rows)
@@ -79,8 +89,7 @@ def kind_of(
         hessian=_places(hessian),
         size=variables.numel(),
         given=given.numel(),
-        rows=rows.shape[0],
-        zero=zero.shape[0],
+        limits=limits,
         is_priced=not price.is_zero(),
     )
 
@@ -98,13 +107,14 @@ def _places(matrix: Any) -> tuple[IntArray, IntArray]:
 def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -> BlockProgram:
     """The program of `size` variables and so many parameters that blocks add up to."""
     x, p = casadi.MX.sym("x", size), casadi.MX.sym("p", given)
-    number = sum(one.kind.rows * one.number for one in blocks)
+    limits = np.concatenate([np.tile(one.kind.limits, (one.number, 1)) for one in blocks])
+    number = len(limits)
     of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", number)
     price, rows, entries, curves = casadi.MX(0.0), [], [], []
     of_entries, of_curves = list[IntArray](), list[IntArray]()  # (2, n) row and column of each
-    limits, first = np.zeros((number, 2)), 0  # rows must be zero, or else not positive
+    first = 0
     for one in blocks:
-        kind, count = one.kind, one.number
+        kind, count, last = one.kind, one.number, first + one.rows
         taken = casadi.reshape(x[one.variables.ravel("F").tolist()], kind.size, count)
         if one.given.dtype.kind == "i":  # places among the parameters
             known = casadi.reshape(p[one.given.ravel("F").tolist()], kind.given, count)
@@ -112,18 +122,16 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
             known = casadi.MX(casadi.DM(one.given.reshape(kind.given, count)))
         if kind.is_priced:
             price += casadi.sum2(kind.price.map(count)(taken, known))
-        weights = casadi.reshape(of_g[first : first + kind.rows * count], kind.rows, count)
+        weights = casadi.reshape(of_g[first:last], len(kind.limits), count)
         curve = kind.curve.map(count)(taken, known, casadi.repmat(of_f, 1, count), weights)
         rows.append(casadi.vec(kind.value.map(count)(taken, known)))
         entries.append(casadi.vec(kind.slope.map(count)(taken, known)))
         curves.append(casadi.vec(curve))
         row, column = kind.jacobian
-        row = (first + kind.rows * np.arange(count)[:, None] + row).ravel()
+        row = (first + len(kind.limits) * np.arange(count)[:, None] + row).ravel()
         of_entries.append(np.array([row, one.variables[column].ravel("F")]))
         both = np.array([one.variables[place].ravel("F") for place in kind.hessian])
         of_curves.append(np.sort(both, axis=0))  # of the upper triangle
-        last = first + kind.rows * count
-        limits[first:last, 0].reshape(count, kind.rows)[:, kind.zero :] = -np.inf
         first = last
     g = casadi.vertcat(*rows)
     jacobian = _matrix(casadi, entries, of_entries, first, size)

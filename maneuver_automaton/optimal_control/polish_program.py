@@ -146,10 +146,17 @@ class PolishProgram(NamedTuple):
         """Control points of every solid of the body, in numbers."""
         if not self.scene.parts:
             return []
-        begin, end = point.state[:-1].T, point.state[1:].T
-        every = self.path.map(self.n_intervals)
-        found = [m.full() for m in every(begin, end, point.control.T, point.durations[None])]
-        return list(zip(found[0::2], found[1::2], strict=True))
+        return _points(self.path, *(array.tobytes() for array in point), self.n_intervals)
+
+
+@functools.lru_cache(maxsize=4)  # a round asks for the same ones several times
+def _points(
+    path: Any, states: bytes, controls: bytes, durations: bytes, count: int
+) -> list[tuple[Array, Array]]:
+    state = np.frombuffer(states).reshape(count + 1, -1)
+    control, step = np.frombuffer(controls).reshape(count, -1), np.frombuffer(durations)
+    found = [m.full() for m in path.map(count)(state[:-1].T, state[1:].T, control.T, step[None])]
+    return list(zip(found[0::2], found[1::2], strict=True))
 
 
 class IntervalKinds(NamedTuple):
@@ -266,35 +273,38 @@ def _guard_kind(model: Model, guard: Guard, tightening: float, paced: bool) -> K
     duration, share, inner = casadi.SX.sym("T"), casadi.SX.sym("share"), casadi.SX.sym("inner")
     third = duration * share * (control[own] if paced else 1.0) / 3.0
     at_ends = len(_ends_in_rates(model)) < own  # otherwise the next interval has the last node
-    room, below = CURVED * tightening, []
+    room, within = CURVED * tightening, list[tuple[Any, float, float]]()
     with numpy_on_symbols(casadi):
         for state, sign, node in ((first, 1.0, inner), (last, -1.0, 1.0)):
             z, u = state[dof:], control[:own]
-            over = casadi.vertcat(*_over(casadi, model, guard, z, u))
             rates = casadi.vertcat(*model.dynamics(casadi.vertsplit(z), casadi.vertsplit(u)))
-            changes = casadi.which_depends(over, z, 1, True)  # in the interval: others are constant
-            bent = casadi.vertcat(casadi.SX(0, 1), *(over[k] for k, v in enumerate(changes) if v))
-            below.append(bent + sign * third * casadi.jtimes(bent, z, casadi.SX(rates)) + room)
-            if sign > 0.0:
-                below.append(over + node * room)
-            elif at_ends:
-                below.append(bent + room)
+            for size, low, high in _guarded(casadi, model, guard, z, u):
+                least, most = low + room, high - room
+                (bent,) = casadi.which_depends(size, z, 1, True)  # in the interval: not constant
+                if bent:
+                    beside = size + sign * third * casadi.jtimes(size, z, casadi.SX(rates))
+                    within.append((beside, least, most))
+                if sign > 0.0:
+                    wider = 1.0 if math.isinf(high) else -size / high
+                    within.append((size + (1.0 - node) * room * wider, least, most))
+                elif at_ends and bent:
+                    within.append((size, least, most))
     every = casadi.vertcat(first, last, control, duration)
-    return kind_of(casadi, every, casadi.vertcat(share, inner), below=casadi.vertcat(*below))
+    return kind_of(casadi, every, casadi.vertcat(share, inner), within=within)
 
 
-def _over(casadi: Any, model: Model, guard: Guard, z: Any, u: Any) -> list[Any]:
-    """By how much a state and a control exceed each limit of a guard."""
+def _guarded(
+    casadi: Any, model: Model, guard: Guard, z: Any, u: Any
+) -> list[tuple[Any, float, float]]:
+    """What a guard limits of a state and a control, and its limits."""
     v_x, v_y, turn = (
         casadi.SX(v) for v in model.velocity(casadi.vertsplit(z), casadi.vertsplit(u))[:3]
     )
     aside = not v_y.is_zero()
     speed = casadi.sqrt(v_x * v_x + v_y * v_y + STILL) if aside else v_x
-    over = [] if guard.reverse else [-v_x]
-    for size, most in ((speed, guard.speed), (speed * turn, guard.lateral)):
-        if math.isfinite(most):
-            over += [size - most, -size - most]
-    return over
+    ahead = [] if guard.reverse else [(v_x, 0.0, math.inf)]
+    limited = ((speed, guard.speed), (speed * turn, guard.lateral))
+    return ahead + [(size, -most, most) for size, most in limited if math.isfinite(most)]
 
 
 def _blocks(
@@ -353,7 +363,7 @@ def _kinds(
     with numpy_on_symbols(casadi):
         begin, end = (_frames(casadi, model, x, control[:own]) for x in (first, last))
         (swing,) = paths(casadi, (POINT,), begin, end, step=step)
-        below = _between(model, begin, end, step=step, settings=settings)
+        within = _between(model, begin, end, step=step, settings=settings)
     every = casadi.vertcat(first, last, control, duration)
     nothing = casadi.SX.sym("nothing", 0)
     before, after = casadi.SX.sym("before", own), casadi.SX.sym("after", own)
@@ -362,8 +372,7 @@ def _kinds(
     beyond = [wall[0] * swing.x[k] + wall[1] * swing.y[k] - wall[2] for k in (2, 3)]
     paces = casadi.SX.sym("paces", 2)
     return IntervalKinds(
-        stage=kind_of(casadi, every, share, price=price, zero=defects,
-                      below=casadi.vertcat(casadi.SX(0, 1), *below)),
+        stage=kind_of(casadi, every, share, price=price, zero=defects, within=within),
         change=kind_of(casadi, casadi.vertcat(before, after), nothing, price=change * changed),
         place=kind_of(casadi, place, wall, below=casadi.dot(wall[:2], place) - wall[2]),
         swing=kind_of(casadi, every, casadi.vertcat(wall, share),
@@ -391,7 +400,7 @@ def _path(model: Model, scene: PolishScene) -> Any:
 
 def _between(
     model: Model, begin: NodeMotion, end: NodeMotion, *, step: Any, settings: PolishSettings
-) -> list[Any]:
+) -> list[tuple[Any, float, float]]:
     """What keeps reduced states inside their limits between nodes, where they do not run straight.
 
     The control points of the cubic with the same values and rates at both nodes are kept inside.
@@ -402,9 +411,8 @@ def _between(
         low, high = limits[k]
         points = (begin.reduced[k, :] + step / 3.0 * begin.reduced_rates[k, :],
                   end.reduced[k, :] - step / 3.0 * end.reduced_rates[k, :])  # fmt: skip
-        for point in points:
-            rows += [(point - high).T] if np.isfinite(high) else []
-            rows += [(low - point).T] if np.isfinite(low) else []
+        if np.isfinite([low, high]).any():
+            rows += [(point, low, high) for point in points]
     return rows
 
 

@@ -133,7 +133,7 @@ def solver_of(
     if elastic:
         numbers = np.arange(len(bounds) - len(inside), len(bounds))[None]
         blocks.append(Blocks(_priced(price), numbers, np.zeros((0, numbers.size))))
-    takes = ROW_S * sum(one.kind.rows * one.number for one in blocks)
+    takes = ROW_S * sum(one.rows for one in blocks)
     if takes > budget.left:
         return float(takes)
     given = OF_LINE * len(own) + corners.size
@@ -377,6 +377,7 @@ def _point_at(program: PolishProgram, values: Array) -> Point:
 def _options(settings: PolishSettings, most: int) -> dict[str, Any]:
     return QUIET | {
         "ipopt.mumps_pivot_order": ORDERING,
+        "ipopt.mumps_scaling": 0,  # none: the same iterates, without a look at all entries
         "ipopt.mu_init": settings.mu_init,
         "ipopt.tol": settings.tolerance,
         "ipopt.constr_viol_tol": settings.violation,
@@ -566,7 +567,10 @@ def polish(
     if steps.kept is not None:
         best = steps.kept
         total = total._replace(status=SolveStatus.SOLVED, reason="settled", objective=steps.least)
-    return _polished(best, total, len(apart.own), max(budget.elapsed - began, needed))
+    lines = len(apart.own)
+    if fixed_planes and total.status is SolveStatus.SOLVED:  # free ones that are slack gain nothing
+        lines = apart.binding(program, best, TIGHT * reach)
+    return _polished(best, total, lines, max(budget.elapsed - began, needed))
 
 
 def _polished(point: Point, total: SolverAnswer, lines: int, seconds: float) -> Polished:

@@ -256,7 +256,7 @@ class Polished:
     durations: Array  # (n - 1,) [s]
     objective: float
     is_feasible: bool  # whether it breaks no condition of the program, solved or not
-    lines: int  # that part it from obstacles
+    lines: int  # that part it from obstacles; of lines that stand still, those that hold it back
     iterations: int
     build_s: float
     solve_s: float

@@ -97,7 +97,7 @@ def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPair
 
 
 def first_lines(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
-    """Lines between nearest points; where two solids overlap, along their least penetration."""
+    """Lines midway between nearest points; of solids that overlap, along the least penetration."""
     import shapely
 
     if not len(pairs.piece):
@@ -115,7 +115,9 @@ def first_lines(program: PolishProgram, point: Point, pairs: SolidPairs) -> Line
     for row in np.flatnonzero(np.hypot(*(there - here).T) < TOUCHING):
         own = shapely.get_coordinates(mine[row])
         angle[row], anchor[row] = _least_penetration(own, pieces[pairs.piece[row]][0])
-    return Lines(angle, anchor)
+    body, gone = program.scene.body, np.array([pieces[k][1] for k in used.tolist()])[owner]
+    rounding = np.array([by for _, by in body])[pairs.body]
+    return Lines(angle, anchor).shifted(0.5 * (rounding - gone))
 
 
 class Reach(NamedTuple):
@@ -326,6 +328,11 @@ class Parting(NamedTuple):
         """Whether every path keeps half of the margin to its piece."""
         reach = self._reach(program, point)
         return bool((reach.between - reach.piece <= -0.5 * program.settings.clearance).all())
+
+    def binding(self, program: PolishProgram, point: Point, tight: float) -> int:
+        """How many lines that stand still at the pieces hold the body back, nearer than so [m]."""
+        reach = self._reach(program, point)
+        return int(np.count_nonzero(reach.nodes + self.margins > -tight))
 
     def with_margins(self, program: PolishProgram, point: Point, *, fixed: bool) -> Parting:
         """With room for what corners swing out between nodes; `fixed` lines touch the pieces."""

@@ -44,6 +44,7 @@ from maneuver_automaton.refinement.closure import PolishedMotion, closed
 from maneuver_automaton.refinement.gear_sequences import gears_of, without_shuffles
 
 NEAR = 1.12  # share of the best cost so far up to which free lines are tried
+SLOW = 1.6  # times the best cost so far: of guesses that take longer none came out best
 DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
 SHUFFLE = 6  # changes of gear from which on gears are fixed first
 FIRST_BUILD = 0.3  # [s] that writing a problem down is expected to take
@@ -322,7 +323,10 @@ class _Polishing:
             if self._is_over():
                 break
             self.steps.append(len(guess.control))
-            if self.best is not None:  # it is slow: steps as short as those of a motion worth it
+            if self.best is not None:
+                if guess.duration > SLOW * self.best.objective:
+                    continue
+                # it is slow: steps as short as those of a motion worth it
                 fewer = min(self.steps[-1], intervals_for(NEAR * self.best.objective))
                 guess = _in_steps(guess, fewer)
             rough = self._rough(number, guess)
@@ -487,6 +491,8 @@ class _Polishing:
 
     def _consider(self, found: Polished, number: int, *, again: bool = True) -> bool:
         """Close the motion found, and keep it if it is accepted and better."""
+        if self.best is not None and found.objective >= self.best.objective:
+            return True
         gears = None
         if not self.task.movers:  # whose places follow from an even pace
             gears = without_shuffles(self.task.model, found, SHUFFLED * self._reach)

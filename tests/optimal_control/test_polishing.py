@@ -8,16 +8,19 @@ import shapely
 
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
+from maneuver_automaton.optimal_control.polish_program import program_of
 from maneuver_automaton.optimal_control.polishing import polish
 from maneuver_automaton.optimal_control.scene import (
     NEVER,
     BodyPart,
     MotionEnds,
     MovingSolid,
+    Point,
     PolishScene,
     PolishSettings,
     pieces_during,
 )
+from maneuver_automaton.optimal_control.separation import pairs_near, parted
 from tests.reference_dynamics import trailer_pose
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -72,6 +75,18 @@ def test_a_disc_is_passed_as_it_is() -> None:
         found.state, found.control, found.durations, shapely.get_coordinates(around)
     )
     assert 0.0 < clearance < 0.01
+
+
+def test_first_lines_are_midway_between_rounded_solids() -> None:
+    body = BodyPart(solids=((np.zeros((1, 2)), 0.1),))
+    scene = PolishScene(parts=(body,), pieces=((np.array([[2.0, 1.0]]), 0.3),))
+    ahead = guess()
+    point = Point(ahead.state, ahead.control, np.full(40, 0.15))
+    program = program_of(ROBOT, at_rest(4.0), scene, PolishSettings(), None, None, point)
+    apart = parted(program, point, pairs_near(program, point, 0.7))
+    to_body, to_disc = apart.lines.anchor[:, 1] - 0.1, 0.7 - apart.lines.anchor[:, 1]
+    middle = np.argmin(np.abs(apart.lines.anchor[:, 0] - 2.0))
+    assert to_body[middle] == pytest.approx(to_disc[middle], abs=1e-2)
 
 
 def test_a_guess_inside_is_led_out() -> None:

@@ -14,7 +14,6 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.polishing import intervals_for, polish
 from maneuver_automaton.optimal_control.scene import BodyPart, Polished
@@ -151,15 +150,17 @@ def test_work_is_counted_in_iterations() -> None:
     assert kinds[0] == kinds[1]
 
 
-def test_where_no_line_is_needed_what_is_found_first_is_not_solved_again() -> None:
-    slow = replace(around(), duration=3.0 * around().duration)
-    found = polish_guesses(replace(swerve(), obstacles=()), [around(), slow], budget=UNLIMITED)
+@pytest.mark.parametrize("obstacles", [(), (Box([1.0, 1.0], [7.0, 6.0]),)])
+def test_where_no_line_holds_back_what_is_found_first_is_not_solved_again(obstacles) -> None:
+    slow = replace(around(), duration=3.0 * around().duration)  # as good as none
+    task = replace(swerve(), obstacles=obstacles)
+    found = polish_guesses(task, [around(), around(), slow], budget=UNLIMITED)
     assert [(one.guess, one.kind) for one in found.attempts] == [
         (0, "fixed planes"), (1, "fixed planes"), (found.attempts[-1].guess, "finer"),
     ]  # fmt: skip
 
 
-def test_a_guess_of_a_slow_motion_gets_no_more_steps_than_the_best_may_have(monkeypatch) -> None:
+def test_a_guess_of_many_steps_gets_no_more_steps_than_the_best_may_have(monkeypatch) -> None:
     steps = []
 
     def recorded(model, ends, scene, guess, **values):
@@ -167,11 +168,11 @@ def test_a_guess_of_a_slow_motion_gets_no_more_steps_than_the_best_may_have(monk
         return polish(model, ends, scene, guess, **values)
 
     monkeypatch.setattr("maneuver_automaton.refinement.polish.polish", recorded)
-    slow = Guess(state=around().state.repeat(3, 0), control=around().control.repeat(3, 0),
-                 duration=3.0 * around().duration)  # fmt: skip
-    found = polish_guesses(replace(swerve(), obstacles=()), [around(), slow], budget=UNLIMITED)
+    many = replace(around(), state=around().state.repeat(3, 0),
+                   control=around().control.repeat(3, 0))  # fmt: skip
+    found = polish_guesses(replace(swerve(), obstacles=()), [around(), many], budget=UNLIMITED)
     assert found.motion is not None
-    assert steps[1] == intervals_for(NEAR * found.motion.objective) < len(slow.control)
+    assert steps[1] == intervals_for(NEAR * found.motion.objective) < len(many.control)
 
 
 def test_bounds_count_where_the_way_comes_near_to_them() -> None:
