@@ -26,13 +26,16 @@ def write_pieces(field: Field, solids: Solids, n: int) -> None:
     squares, lefts = np.empty(columns), np.empty(columns)
     for p in range(n):
         low, high, rounding = plates[p, 0], plates[p, 2], plates[p, 4]
-        i_0 = max(0, int((low - cap - field.origin_x) / cell))
-        i_1 = max(i_0, min(columns, int((high + cap - field.origin_x) / cell) + 1))
         j_0 = max(0, int((plates[p, 1] - cap - field.origin_y) / cell))
         j_1 = min(rows, int((plates[p, 3] + cap - field.origin_y) / cell) + 1)
-        x, square, left = xs[i_0:i_1], squares[i_0:i_1], lefts[i_0:i_1]
         for j in range(j_0, j_1):
             y = field.origin_y + (j + 0.5) * cell
+            # Nothing is lowered beyond the cap; a cell more, for rounding.
+            away = max(max(plates[p, 1] - y, y - plates[p, 3]), 0.0)
+            reach = math.sqrt(max(cap * cap - away * away, 0.0)) + cell
+            i_0 = max(0, int((low - reach - field.origin_x) / cell))
+            i_1 = max(i_0, min(columns, int((high + reach - field.origin_x) / cell) + 1))
+            x, square, left = xs[i_0:i_1], squares[i_0:i_1], lefts[i_0:i_1]
             square[:] = math.inf
             # A line and a disc's middle have no inside.
             left[:] = math.inf if first[p + 1] - first[p] > 2 else -1.0

@@ -37,6 +37,7 @@ from maneuver_automaton.collision.swept import (
     windows,
 )
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.groups._kernels import coasted_at
 from maneuver_automaton.groups.se2 import after, displacements
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
@@ -209,10 +210,7 @@ class FclChecker:
         parts = windows(coasts)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
-
-        def posed(of: IntArray, times: Array) -> Array:
-            return after(starts[of], displacements(twists[of], times))
-
+        twists = np.array(twists)
         while parts.coast.size:
             ask()
             of = parts.coast
@@ -220,7 +218,8 @@ class FclChecker:
                 _sliced(self._body, kinds[k], level)
                 for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
             ]
-            hits = _touching([solid for solid, _ in solids], posed(of, parts.begins), laid.static)
+            poses = coasted_at(starts, twists, of, parts.begins)
+            hits = _touching([solid for solid, _ in solids], poses, laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
                 if solids[row][1] <= 0.5 * self.proven and (not first or of[row] < first[0]):
                     first = int(of[row]), int(laid.owners[triangle])
@@ -228,7 +227,8 @@ class FclChecker:
             if not sooner:
                 break
             parts = parts.of(np.array(sooner))
-            middles = posed(parts.coast, parts.begins + 0.5 * parts.lengths)
+            times = parts.begins + 0.5 * parts.lengths
+            middles = coasted_at(starts, twists, parts.coast, times)
             hit = self._first_pose_hit(middles, parts.coast, laid)
             if hit is not None:
                 first, parts = hit, parts.of(parts.coast < hit[0])
@@ -387,19 +387,9 @@ def _object(skin: Skin) -> Any:
 
     model = fcl.BVHModel()
     model.beginModel(len(skin.triangles), len(skin.vertices))
-    model.addSubModel(skin.vertices, skin.triangles)
+    model.addSubModel(skin.vertices, skin.triangles.tolist())  # of lists it reads numbers sooner
     model.endModel()
     return fcl.CollisionObject(model)
-
-
-def _turns(poses: Array) -> Array:
-    """Rotation matrices (n, 3, 3) about the vertical."""
-    turns = np.zeros((len(poses), 3, 3))
-    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(poses[:, 2])
-    turns[:, 1, 0] = np.sin(poses[:, 2])
-    turns[:, 0, 1] = -turns[:, 1, 0]
-    turns[:, 2, 2] = 1.0
-    return turns
 
 
 def _touching(
@@ -412,10 +402,13 @@ def _touching(
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
     places = np.zeros((len(poses), 3))
     places[:, :2] = poses[:, :2]
+    half = 0.5 * poses[:, 2]
+    # Turns as quaternions in plain numbers: to hand over a matrix takes as long as some answers.
+    turns = zip(np.cos(half).tolist(), np.sin(half).tolist(), strict=True)
     hits: dict[int, int] = {}
     with _ONE_AT_A_TIME:
-        for k, (one, turn, place) in enumerate(zip(ones, _turns(poses), places, strict=True)):
-            one.setRotation(turn)
+        for k, (one, (w, z), place) in enumerate(zip(ones, turns, places, strict=True)):
+            one.setQuatRotation((w, 0.0, 0.0, z))
             one.setTranslation(place)
             if collide(one, other, request, result):
                 hits[k] = result.contacts[0].b2

@@ -30,14 +30,9 @@ from maneuver_automaton.collision.shapes import (
 )
 from maneuver_automaton.groups import SE2
 
+# On a quadrilateral: its sheet, and posts on two sides, with tops above the first two corners.
+QUAD: IntArray = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 4], [1, 2, 5]])
 POINT = 1e-9  # [m] half the side of the square that stands for a vehicle without a footprint
-
-
-class Cover(NamedTuple):
-    """A part of the plane: triangles that cover it, and where posts stand, two on each part."""
-
-    cover: Array  # (n, 3, 2) [m]
-    posts: Array  # (m, 2, 2) from where to where [m]
 
 
 class Skin(NamedTuple):
@@ -84,30 +79,30 @@ def convex_hull(points: Array) -> Array:
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Cover]:
-    """The region of each obstacle in its own frame; a disc stands out by at most `excess` [m]."""
+def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Skin]:
+    """Sheet and posts of each obstacle in its own frame; a disc's stand out by `excess` [m]."""
     shapes = [None if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
-    boxes = [one for one in shapes if isinstance(one, Box)]
-    fans: Iterator[Cover] = iter(())
-    if boxes:
-        both = _region(box_corners(boxes)[:, [[0, 1, 2], [0, 2, 3]]])
-        fans = map(Cover, both.cover.reshape(-1, 2, 3, 2), both.posts.reshape(-1, 2, 2, 2))
-    covers = _covers([one for one in shapes if isinstance(one, Polygon)])
-    regions = []
-    for one, shape in zip(obstacles, shapes, strict=True):
+    boxes = {k: one for k, one in enumerate(shapes) if isinstance(one, Box)}
+    polygons = {k: one for k, one in enumerate(shapes) if isinstance(one, Polygon)}
+    fours = {k: o.corners for k, o in polygons.items() if len(o.corners) == 4 and o.is_plain}
+    corners = [*(box_corners(list(boxes.values())) if boxes else ()), *fours.values()]
+    quads = (Skin(one, QUAD) for one in _on_quads(np.reshape(corners, (-1, 4, 2))))
+    found = dict(zip([*boxes, *fours], quads, strict=True))
+    others = {k: one for k, one in polygons.items() if k not in fours}
+    found.update(zip(others, _on_polygons(list(others.values())), strict=True))
+    for k, (one, shape) in enumerate(zip(obstacles, shapes, strict=True)):
         if isinstance(one, OccupancyMap):
             rectangles = blocked_rectangles(one.blocked).astype(np.float64)
-            halves = rectangles[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
-            regions.append(_region(SE2(one.origin).act(one.resolution * halves)))
+            rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
+            cells = _on_quads(SE2(one.origin).act(rings))
+            triangles = 6 * np.arange(len(cells))[:, None, None] + QUAD
+            found[k] = Skin(cells.reshape(-1, 3), triangles.reshape(-1, 3))
         elif isinstance(shape, Disc):
             ring = circumscribed(shape.center, shape.radius, excess)
             first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
-            regions.append(_region(np.stack([first, ring[1:-1], ring[2:]], axis=1)[None]))
-        elif isinstance(shape, Polygon):
-            regions.append(next(covers))
-        else:
-            regions.append(next(fans))
-    return regions
+            fan = np.stack([first, ring[1:-1], ring[2:]], axis=1)
+            found[k] = _on_triangles(fan, np.zeros(1, dtype=np.int64))
+    return [found[k] for k in range(len(shapes))]
 
 
 def body_skin(pieces: Sequence[Array]) -> Skin:
@@ -125,31 +120,38 @@ def body_skin(pieces: Sequence[Array]) -> Skin:
     return Skin(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def obstacle_skin(regions: Sequence[Cover]) -> tuple[Skin, IntArray]:
-    """Sheets and posts of regions, and which region each triangle belongs to."""
-    cover = np.concatenate([region.cover for region in regions]).reshape(-1, 2)
-    posts = np.concatenate([region.posts for region in regions])
-    feet = _raised(posts.reshape(-1, 2), 0.5).reshape(-1, 2, 3)
-    tops = _raised(posts[:, 0], 1.5)[:, None]
-    vertices = np.concatenate(
-        [_raised(cover, 0.5), np.concatenate([feet, tops], axis=1).reshape(-1, 3)]
-    )
-    index = np.arange(len(regions))
-    owners = [
-        np.repeat(index, [len(region.cover) for region in regions]),
-        np.repeat(index, [len(region.posts) for region in regions]),
-    ]
-    return Skin(vertices, np.arange(len(vertices)).reshape(-1, 3)), np.concatenate(owners)
+def obstacle_skin(regions: Sequence[Skin]) -> tuple[Skin, IntArray]:
+    """Regions as one skin, and which of them each triangle belongs to."""
+    counts = [len(region.triangles) for region in regions]
+    firsts = np.cumsum([0, *(len(region.vertices) for region in regions[:-1])])
+    triangles = np.concatenate([region.triangles for region in regions])
+    triangles += np.repeat(firsts, counts)[:, None]
+    vertices = np.concatenate([region.vertices for region in regions])
+    return Skin(vertices, triangles), np.repeat(np.arange(len(regions)), counts)
 
 
 def _raised(places: Array, height: float) -> Array:
     return np.column_stack([places, np.full(len(places), height)])
 
 
-def _region(triangles: Array) -> Cover:
-    """Connected parts (k, m, 3, 2) of m triangles each; no line holds both posts of one."""
-    posts = triangles[:, 0][:, [[0, 1], [1, 2]]]
-    return Cover(triangles.reshape(-1, 3, 2), posts.reshape(-1, 2, 2))
+def _on_quads(corners: Array) -> Array:
+    """Vertices (k, 6, 3) of sheets and posts on convex quadrilaterals (k, 4, 2), for `QUAD`."""
+    vertices = np.full((len(corners), 6, 3), 0.5)
+    vertices[:, :4, :2], vertices[:, 4:, :2] = corners, corners[:, :2]
+    vertices[:, 4:, 2] = 1.5
+    return vertices
+
+
+def _on_triangles(triangles: Array, posted: IntArray) -> Skin:
+    """Sheet of triangles (m, 3, 2), and two posts on some of these, by number.
+
+    No line holds both.
+    """
+    n, tops = 3 * len(triangles), triangles[posted, :2].reshape(-1, 2)
+    foot, top = 3 * posted, n + 2 * np.arange(len(posted))
+    posts = np.stack([foot, foot + 1, top, foot + 1, foot + 2, top + 1], axis=1).reshape(-1, 3)
+    vertices = np.concatenate([_raised(triangles.reshape(-1, 2), 0.5), _raised(tops, 1.5)])
+    return Skin(vertices, np.concatenate([np.arange(n).reshape(-1, 3), posts]))
 
 
 def _grown(part: Array, corners: Array) -> Array:
@@ -157,10 +159,12 @@ def _grown(part: Array, corners: Array) -> Array:
     return convex_hull((part[:, None] + corners).reshape(-1, 2))
 
 
-def _covers(polygons: Sequence[Polygon]) -> Iterator[Cover]:
-    """What covers each polygon: triangles, cut of all at once, and posts on one of each part."""
+def _on_polygons(polygons: Sequence[Polygon]) -> Iterator[Skin]:
+    """Sheet of each polygon, all cut into triangles at once, and posts on one of each part."""
     import shapely
 
+    if not polygons:
+        return
     outlined = outlines_of(polygons)
     parts = np.array([part for some in outlined for part in some], dtype=object)
     triangles, of = shapely.get_parts(
@@ -175,7 +179,6 @@ def _covers(polygons: Sequence[Polygon]) -> Iterator[Cover]:
         )
     corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
     begins = np.searchsorted(of, np.arange(len(parts) + 1))
-    whole = _region(corners[begins[:-1], None])  # the first triangle of each part
     ends = np.cumsum([0, *map(len, outlined)])
     for a, b in itertools.pairwise(ends.tolist()):
-        yield Cover(corners[begins[a] : begins[b]], whole.posts[2 * a : 2 * b])
+        yield _on_triangles(corners[begins[a] : begins[b]], begins[a:b] - begins[a])

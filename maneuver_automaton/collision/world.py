@@ -156,7 +156,7 @@ def _static_arrays(
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
     field = _field(solids, maps, body, keep)
-    _write(field, pieces[:listed], [] if maps else _last_field(footprint, frame, keep))
+    _write(field, pieces[:listed], solids, [] if maps else _last_field(footprint, frame, keep))
     for one in maps:
         x, y, heading = one.origin.tolist()
         there = Place(x, y, math.cos(heading), math.sin(heading))
@@ -224,7 +224,7 @@ def _box(boxes: Array, moving: list[_Moving], frame: Array) -> Array:
     return np.concatenate([low.min(axis=0), high.max(axis=0)])
 
 
-_Last: TypeAlias = list[tuple[Field, frozenset[tuple[bytes, float]]]]
+_Last: TypeAlias = list[tuple[Field, list[tuple[Array, float]]]]
 
 
 @functools.lru_cache(maxsize=16)
@@ -233,17 +233,22 @@ def _last_field(footprint: tuple[Shape, ...], frame: tuple[float, ...], keep: fl
     return []
 
 
-def _write(field: Field, pieces: list[tuple[Array, float]], last: _Last) -> None:
-    """Lower a field to the distances of pieces: on from the last one, if these hold all of its."""
-    keys = [(ring.tobytes(), by) for ring, by in pieces]
-    begun, known = last[0] if last else (field, frozenset())
+def _write(field: Field, pieces: list[tuple[Array, float]], solids: Solids, last: _Last) -> None:
+    """Lower a field to the distances of pieces: on from the last one, if these hold all of its.
+
+    The `solids` begin with them.
+    """
+    begun, known = last[0] if last else (field, [])
     alike = begun[1:] == field[1:] and begun.distance.shape == field.distance.shape
-    if known and alike and known.issubset(keys):
+    held = {(ring.tobytes(), by) for ring, by in known if alike}
+    keys = [(ring.tobytes(), by) for ring, by in pieces if held]
+    if held and held.issubset(keys):
         field.distance[:] = begun.distance
-        pieces = [one for one, key in zip(pieces, keys, strict=True) if key not in known]
+        pieces = [one for one, key in zip(pieces, keys, strict=True) if key not in held]
+        solids = solids_of(pieces)
     else:
-        last[:] = [(field, frozenset(keys))]
-    _kernels_field.write_pieces(field, solids_of(pieces), len(pieces))
+        last[:] = [(field, pieces)]
+    _kernels_field.write_pieces(field, solids, len(pieces))
 
 
 def _field(solids: Solids, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
