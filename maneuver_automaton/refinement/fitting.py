@@ -23,6 +23,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words._kernels_steering import pairs_ending
 from maneuver_automaton.words.closing import EndConditions, closest_times, conjugated, times_through
 
 TIME_TOLERANCE = 1e-9  # [s] by which a time may miss a limit, and as a share of the limit
@@ -160,7 +161,9 @@ def _short_words(
     rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
     way = goal - problem.start
     z, heading = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
-    i, j = np.indices((len(trims), len(trims))).reshape(2, -1)
+    i, j = pairs_ending(z, heading, rows, BESIDE * (1.0 + abs(z))).T
+    if not i.size:
+        return
     v, w = rows[:, 0] + 1j * rows[:, 1], rows[:, 2]
     turns = w != 0.0
 
@@ -179,11 +182,6 @@ def _short_words(
         r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
         h = np.full(i.size, heading)
         aside = ended(h)[2]
-        beside = np.where(turns[i] | turns[j], np.abs(aside), abs(wrapped(heading)))
-        kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
-        if not kept.size:
-            return
-        i, j, h, aside = i[kept], j[kept], h[kept], aside[kept]
         slope = (ended(h + BESIDE)[2] - aside) / BESIDE
         most = (1.0 - ROUNDED) * MET  # by which the last heading may be off as well
         h = h + np.where(np.abs(aside) > most, (-aside / slope).real.clip(-most, most), 0.0)

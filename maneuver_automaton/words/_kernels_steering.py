@@ -12,6 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.groups._kernels import nearest_turn
 
 MISSED = 1e-6  # share of all lengths by which a word surely misses: rounding is far below it
 
@@ -316,3 +317,35 @@ def steer_batch(
         goal = (complex(goals[row, 0], goals[row, 1]), goals[row, 2], unit(goals[row, 2]))
         steer(trims, steps, goal, (tolerance, -math.inf), times[row])
     return times
+
+
+@kernel
+def pairs_ending(way: complex, heading: float, twists: Array, within: float) -> IntArray:
+    """Pairs (n, 2) of trims, a first and a last one, that may end within [m, rad] of a pose.
+
+    It is a `way` off and turned by its `heading`. Two turns miss it by how far their centres are
+    from where they must be, a turn and a straight by how far that passes, two straights by heading.
+    """
+    count, n, last = len(twists), 0, unit(heading)
+    arms = np.zeros(count, dtype=np.complex128)  # from the centres of turns
+    velocities, found = np.empty_like(arms), np.empty((count * count, 2), dtype=np.int64)
+    for i in range(count):
+        velocities[i] = complex(twists[i, 0], twists[i, 1])
+        if twists[i, 2] != 0.0:
+            arms[i] = complex(twists[i, 1], -twists[i, 0]) / twists[i, 2]
+    for i in range(count):
+        for j in range(count):
+            turns, far = twists[i, 2] != 0.0, way + arms[i] - arms[j] * last
+            if turns and twists[j, 2] != 0.0:
+                off = abs(abs(far) - abs(arms[i] - arms[j]))
+            elif turns or twists[j, 2] != 0.0:
+                left = far - arms[i] * last if turns else far + arms[j]
+                along = velocities[j] * last if turns else velocities[i]
+                speed = abs(along)
+                off = abs((left * along.conjugate()).imag) / speed if speed > 0.0 else math.inf
+            else:
+                off = abs(nearest_turn(heading))
+            if off <= within:
+                found[n, 0], found[n, 1] = i, j
+                n += 1
+    return found[:n]

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.words import steer
-from maneuver_automaton.words._kernels_steering import steer_batch
+from maneuver_automaton.words._kernels_steering import pairs_ending, steer_batch
 from tests import reference
 from tests.quickly import draws
 
@@ -195,3 +195,15 @@ def test_scaling_lengths_scales_straights_and_keeps_angles(size):
 def test_wrong_input(twists, goal, options, message):
     with pytest.raises(ValueError, match=message):
         steer(twists, goal, **options)
+
+
+def test_pairs_of_trims_that_end_at_a_pose_are_found():
+    rng = np.random.default_rng(4)
+    twists = np.array([[1.0, 0, 0], [-1, 0, 0], [1, 0, 0.5], [1, 0, -0.5], [0, 0, 1], [0.3, 1, 0]])
+    for i, j in itertools.product(range(6), repeat=2):
+        times = rng.uniform(0.1, 3.0, 2)
+        end = (SE2.exp(times[0] * twists[i]) @ SE2.exp(times[1] * twists[j])).pose
+        found = pairs_ending(complex(*end[:2]), end[2], twists, 1e-9).tolist()
+        assert [i, j] in found
+        aside = pairs_ending(complex(*end[:2]) + 0.1 + 0.1j, end[2] + 0.1, twists, 1e-3).tolist()
+        assert [i, j] not in aside
