@@ -194,7 +194,7 @@ def sole_shortest(problem: Problem, goal: Goal) -> Word | None:
     None for other libraries and conditions, and where another path is as short: where the goal is
     an image of its own, and where no path turns in vain.
     """
-    horizon, driven = problem.horizon, _shortest_trims(problem.automaton, problem.cost)
+    horizon, driven = problem.horizon, shortest_trims(problem.automaton, problem.cost)
     limited = horizon.time is not None or horizon.max_time is not None or horizon.min_coast > 0.0
     relative = goal_from_start(problem, goal)
     if driven is None or limited or goal.free_heading or relative[3] != 0.0:
@@ -219,7 +219,7 @@ def sole_shortest(problem: Problem, goal: Goal) -> Word | None:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _ShortestTrims:
+class ShortestTrims:
     """The trims that the shortest paths of a car are made of, the cheapest per metre of all."""
 
     trims: IntArray  # (3, 2) right, straight, left; backwards and ahead
@@ -228,8 +228,8 @@ class _ShortestTrims:
 
 
 @kept_by_first
-def _shortest_trims(automaton: Automaton, cost: StageCost) -> _ShortestTrims | None:
-    """None where a library lacks one, or has two that do the same at the same price."""
+def shortest_trims(automaton: Automaton, cost: StageCost) -> ShortestTrims | None:
+    """The trims of a car's shortest paths; None where one is missing, or two do the same."""
     library = moving_trims(automaton, cost)
     speeds, radius = library.twists[:, 0], least_radius(library.twists)
     endless = all(trim.max_duration == math.inf for trim in automaton.trims)
@@ -245,7 +245,7 @@ def _shortest_trims(automaton: Automaton, cost: StageCost) -> _ShortestTrims | N
         if rows.size != 1:
             return None
         trims[side + 1, (gear + 1) // 2] = library.trims[rows[0]]
-    return _ShortestTrims(trims=trims, radius=radius, per_metre=least)
+    return ShortestTrims(trims=trims, radius=radius, per_metre=least)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
