@@ -7,6 +7,7 @@ such words is shorter was found on 7 million goals and holds on all of them; `te
 
 from __future__ import annotations
 
+import cmath
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
@@ -18,34 +19,17 @@ NEARLY = 1e-14  # [rad] by which a part may be shorter than zero, for rounding
 # Words, and of their parts the turns, 1 to the left and -1 to the right, and the gears. A turn next
 # to one beside a straight is a quarter; both U last as long.
 LSL, LSR, C_CC, C_C_C, C_CSC, C_CSC_ALIKE, C_CSC_C, C_CUCU_C, CCU_CUC = range(9)
-TURNS = (
-    (1, 0, 1, 0, 0),
-    (1, 0, -1, 0, 0),
-    (-1, 1, -1, 0, 0),
-    (1, -1, 1, 0, 0),
-    (-1, 1, 0, -1, 0),
-    (-1, 1, 0, 1, 0),
-    (-1, 1, 0, -1, 1),
-    (-1, 1, -1, 1, 0),
-    (1, -1, 1, -1, 0),
+PARTS = (
+    ((1, 0, 1, 0, 0), (1, 1, 1, 1, 1)),
+    ((1, 0, -1, 0, 0), (1, 1, 1, 1, 1)),
+    ((-1, 1, -1, 0, 0), (-1, 1, 1, 1, 1)),
+    ((1, -1, 1, 0, 0), (1, -1, 1, 1, 1)),
+    ((-1, 1, 0, -1, 0), (-1, 1, 1, 1, 1)),
+    ((-1, 1, 0, 1, 0), (-1, 1, 1, 1, 1)),
+    ((-1, 1, 0, -1, 1), (-1, 1, 1, 1, -1)),
+    ((-1, 1, -1, 1, 0), (-1, 1, 1, -1, 1)),
+    ((1, -1, 1, -1, 0), (-1, -1, 1, 1, 1)),
 )
-GEARS = (
-    (1, 1, 1, 1, 1),
-    (1, 1, 1, 1, 1),
-    (-1, 1, 1, 1, 1),
-    (1, -1, 1, 1, 1),
-    (-1, 1, 1, 1, 1),
-    (-1, 1, 1, 1, 1),
-    (-1, 1, 1, 1, -1),
-    (-1, 1, 1, -1, 1),
-    (-1, -1, 1, 1, 1),
-)
-
-
-@bare_inner_kernel
-def angle(z: complex) -> float:
-    """Argument of a complex number."""
-    return math.atan2(z.imag, z.real)
 
 
 @bare_shared_kernel
@@ -83,19 +67,19 @@ def shortest(x: float, y: float, heading: float) -> tuple[float, int, int, float
     if alike.real <= 0.0 and far <= 16.0 * s * s:
         bend = complex(math.sqrt(1.0 - 0.0625 * far), 0.25 * math.sqrt(far))
         if (complex(-alike.real, b) * bend * back).imag <= 0.0:
-            h, psi = angle(bend), math.atan2(b, abs(alike.real))
+            h, psi = cmath.phase(bend), math.atan2(b, abs(alike.real))
             return turn, C_C_C, turned, half - h - psi, 2.0 * h, half - h + psi
     far = a * a + apart.imag * apart.imag
     slack = NEARLY * far
     if far >= 4.0 and (apart * back).imag <= slack and (apart * back.conjugate()).real <= slack:
-        gamma, straight = angle(apart), math.sqrt(far) - 2.0
+        gamma, straight = cmath.phase(apart), math.sqrt(far) - 2.0
         t, v = gamma - QUARTER + half, half - gamma
         return straight + turn, C_CSC_ALIKE, turned, t, straight, v
     if far >= 20.0:
         root = math.sqrt(far - 4.0)
         z = apart * complex(root, 2.0)
         if (z * back).real <= slack:
-            gamma = angle(z)
+            gamma = cmath.phase(z)
             t, v = gamma - QUARTER + half, gamma - QUARTER - half
             return 2.0 * gamma + root - 4.0, C_CSC_C, turned, t, root - 4.0, v
     wide = right.real * right.real + b * b
@@ -104,7 +88,7 @@ def shortest(x: float, y: float, heading: float) -> tuple[float, int, int, float
         z = right * complex(root, 2.0)
         slack = NEARLY * wide
         if (z * back).imag >= -slack and (z * back.conjugate()).real <= slack:
-            beta = angle(z)
+            beta = cmath.phase(z)
             t, v = beta - QUARTER + half, beta - half
             return 2.0 * beta + root - 2.0, C_CSC, turned, t, root - 2.0, v
     best, word, t, u, v = math.inf, LSL, 0.0, 0.0, 0.0
@@ -113,14 +97,14 @@ def shortest(x: float, y: float, heading: float) -> tuple[float, int, int, float
         sin_u = math.sqrt(1.0 - cos_u * cos_u)
         z = apart * complex(sin_u, cos_u - 2.0)
         if (z * back).imag >= -NEARLY:
-            gamma, u = angle(z), math.acos(cos_u)
+            gamma, u = cmath.phase(z), math.acos(cos_u)
             best, word, t, v = 2.0 * (gamma + u), C_CUCU_C, gamma + half, gamma - half
     if word == LSL and wide <= 16.0:
         bend = complex(math.sqrt(1.0 - 0.0625 * wide), 0.25 * math.sqrt(wide))
         z = right * bend
         before = right * (bend * back).conjugate()
         if (z * back).imag >= -NEARLY and before.imag >= -NEARLY:
-            h, beta = angle(bend), angle(right)
+            h, beta = cmath.phase(bend), cmath.phase(right)
             best, word, t, u, v = 2.0 * (beta + h), C_CC, beta + half - h, 2.0 * h, beta + h - half
     if near.imag <= 0.0:
         gap = math.sqrt(a * a + near.imag * near.imag)
@@ -133,10 +117,10 @@ def shortest(x: float, y: float, heading: float) -> tuple[float, int, int, float
     if best < math.inf:
         return best, word, turned, t, u, v
     if b * c <= alike.real * s:
-        u, phi = math.sqrt(alike.real * alike.real + b * b), angle(alike)
+        u, phi = math.sqrt(alike.real * alike.real + b * b), cmath.phase(alike)
         return u + turn, LSL, turned, half + phi, u, half - phi
     u = math.sqrt(max(a * a + near.imag * near.imag - 4.0, 0.0))
-    phi = angle(near * complex(u, 2.0))
+    phi = cmath.phase(near * complex(u, 2.0))
     return u + 2.0 * phi, LSR, turned, phi + half, u, phi - half
 
 
@@ -171,7 +155,7 @@ def shortest_batch(goals: Array, turns: IntArray, parts: Array) -> None:
             if j < n:
                 quarter = C_CSC <= word <= C_CSC_C and (j == 1 or j == 3 == n - 2)
                 part = QUARTER if quarter else t if j == 0 else v if j == n - 1 else u
-            turn, part = TURNS[word][j], max(part, 0.0) * GEARS[word][j]
+            turn, part = PARTS[word][0][j], max(part, 0.0) * PARTS[word][1][j]
             at = n - 1 - j if turned & 4 and j < n else j
             if turned & 2:
                 turn, part = -turn, -part
