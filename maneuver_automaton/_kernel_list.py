@@ -24,6 +24,7 @@ USES = {  # modules of kernels, by what calls them
     "times": ("words._kernels_solve", "search._kernels_price"),
     "words": (
         "words._kernels_closing",
+        "words._kernels_shortest",
         "words._kernels_solve",
         "search._kernels_polish",
         "search._kernels_price",
@@ -42,6 +43,7 @@ USES = {  # modules of kernels, by what calls them
         "search._kernels_waiting",
         "words._kernels_candidates",
         "words._kernels_closing",
+        "words._kernels_shortest",
         "words._kernels_solve",
         "words._kernels_steering",
     ),

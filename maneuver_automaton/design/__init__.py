@@ -7,4 +7,4 @@ from maneuver_automaton.design.library_design import DesignedLibrary as Designed
 from maneuver_automaton.design.library_design import design_library as design_library
 from maneuver_automaton.design.proof import WordsProof as WordsProof
 from maneuver_automaton.design.proof import word_lengths as word_lengths
-from maneuver_automaton.design.reeds_shepp import reeds_shepp_length as reeds_shepp_length
+from maneuver_automaton.words.shortest import reeds_shepp_length as reeds_shepp_length

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array
 
 QUARTER, HALF, FULL = 0.5 * np.pi, np.pi, 2.0 * np.pi  # turns
 SLACK = 1e-12  # [rad] by which intervals are widened, for rounding
@@ -100,23 +100,6 @@ class Family:
         """To every goal of the box a path of this kind is no longer; inf if not to every one."""
         angles = np.sum([_greatest(angle) for angle, _ in self.angles], axis=0)
         return np.where(self.everywhere, self.length.high + angles, np.inf)
-
-
-def reeds_shepp_length(goals: ArrayLike, *, radius: float = 1.0) -> Array:
-    """Length (...,) of the shortest path to poses (..., 3) of a car that also reverses [m].
-
-    Source: Reeds, Shepp (1990), *Optimal paths for a car that goes both forwards and backwards*.
-
-    Examples
-    --------
-    >>> reeds_shepp_length([[3.0, 0.0, 0.0], [0.0, 0.0, np.pi]]).round(6).tolist()
-    [3.0, 3.141593]
-    """
-    poses = as_array("goals", goals, last=3)
-    shape, flat = poses.shape[:-1], poses.reshape(-1, 3)
-    scaled = flat / np.array([radius, radius, 1.0])
-    least = np.min([family.lower() for family in families(scaled, scaled)], axis=0)
-    return np.asarray(radius * np.maximum(least, 0.0)).reshape(shape)
 
 
 def families(low: Array, high: Array) -> Iterator[Family]:

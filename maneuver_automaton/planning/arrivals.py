@@ -25,9 +25,10 @@ from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Via
 from maneuver_automaton.search.lattice_goals import nodes_within
-from maneuver_automaton.search.limits import closed_bound, three_are_enough
+from maneuver_automaton.search.limits import closed_bound, shortest_trims, three_are_enough
 from maneuver_automaton.words._kernels_steering import steer_batch
 from maneuver_automaton.words.library import most_different, moving_trims
+from maneuver_automaton.words.shortest import reeds_shepp_length
 
 HEADINGS = 12  # that stand for a free one at least, beside those along the lines to neighbours
 MOST_HEADINGS = 48  # the same where legs are estimated in a moment
@@ -289,7 +290,8 @@ def estimates_words(problem: Problem) -> bool:
 class LegCosts:
     """What legs of a problem cost about, where nothing is in the way.
 
-    For a vehicle that switches at will in a plane, the cheapest word of three trims; else a bound.
+    For a vehicle that switches at will in a plane, the shortest path of a car, or the cheapest word
+    of three trims; else a bound.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -298,6 +300,7 @@ class LegCosts:
         self.are_least = False  # between poses none costs less
         if self.by_words:
             library = moving_trims(problem.automaton, problem.cost)
+            self.car = shortest_trims(problem.automaton, problem.cost)
             self.are_least = len(library.twists) <= MOST_LETTERS and three_are_enough(problem)
             few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
             spin = np.array([[0.0, 0.0, 1.0]])
@@ -319,6 +322,9 @@ class LegCosts:
     def between(self, begins: Array, ends: Array) -> Array:
         """Costs (m, n) of the cheapest words from poses (m, 3) to poses (n, 3)."""
         seen = (SE2(begins[:, None]).inverse() @ SE2(ends[None])).pose.reshape(-1, 3)
+        if self.car is not None:
+            lengths = reeds_shepp_length(seen, radius=self.car.radius)
+            return self.car.per_metre * lengths.reshape(len(begins), len(ends))
         times = self._times(self.words, seen)
         rates = self.rates[self.words][:, None, None]
         sums = np.where(np.isnan(times), np.inf, times * rates).sum(axis=-1)

@@ -65,7 +65,8 @@ def plan(
     PlanResult
         ``status`` says how it ended. ``lower_bound`` is the cost itself where the search was
         exhaustive over all admitted words of at most four moving trims, or over those of three of
-        a vehicle that drives forward alone, otherwise a closed bound.
+        a vehicle that drives forward alone, or the only shortest path of a car in free space was
+        driven; otherwise a closed bound.
 
     Raises
     ------

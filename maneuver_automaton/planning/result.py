@@ -106,7 +106,8 @@ class LowerBound:
     What proves it is its `kind`: ``exhaustive`` a search of all words or of all nodes of a lattice
     of primitives, ``open`` the most promising node that such a search has left, ``cells`` a
     function on cells of poses, ``incumbent`` that no cheaper plan is left, ``disc`` the path of the
-    inscribed disc, and formulas: ``distance``, ``turn``, ``effort``, ``time``.
+    inscribed disc, ``shortest`` that of a car in free space, and formulas: ``distance``, ``turn``,
+    ``effort``, ``time``.
     """
 
     value: float

@@ -36,6 +36,7 @@ from maneuver_automaton.search._kernels_connection import free_candidate
 from maneuver_automaton.search.arrays import Joint, LatticeArrays
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import NO_TRIM
+from maneuver_automaton.words._kernels_shortest import least_cost
 from maneuver_automaton.words.library import Scratch
 
 LEAST_SPREAD = 33.0  # times smaller than the greatest spread of a via-point is the least
@@ -200,13 +201,12 @@ def direct_middle(one: Improving, section: Section) -> int:
 
     Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
     """
-    # In the order of their price: the straight line at the least cost per metre, which no path
+    # In the order of their price: the shortest path at the least cost per metre, which no word
     # undercuts; words in closed form; the proof that one of them is free. So in `via_middle`.
     lib, task = one.library, one.task
     scratch, budget = one.word.one, section.budget
-    x, y, _, _ = section.start
-    e_x, e_y, _, _ = section.goal
-    if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
+    radius = 0.0 if section.free_heading else task.least_radius
+    if least_cost(radius, task.per_metre, section.start, section.goal, budget) >= budget:
         return -1
     words, n_words = words_to(lib, section.free_heading)
     n = candidates(
@@ -256,19 +256,18 @@ def via_middle(
 ) -> int:
     """Write into the new middle a connection to the pose `via`, and one from there on."""
     lib, task, word = one.library, one.task, one.word
-    x, y, _, _ = section.start
-    v_x, v_y, _, _ = via
-    e_x, e_y, _, _ = section.goal
     first, second, budget = word.one, word.two, section.budget
-    length = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
-    if length * task.per_metre >= budget:
+    radius = 0.0 if section.free_heading else task.least_radius
+    least = least_cost(task.least_radius, task.per_metre, section.start, via, budget)
+    most = budget - least_cost(radius, task.per_metre, via, section.goal, budget - least)
+    if least >= most:
         return -1
     before, n_before = words_to(lib, False)
     n_1 = candidates(
-        lib.library, before, n_before, section.start, section.entry, via, there, budget, first
+        lib.library, before, n_before, section.start, section.entry, via, there, most, first
     )
     cheapest = cheapest_of(first, n_1)
-    if cheapest >= budget:
+    if cheapest >= most:
         return -1
     # Each half may cost what the cheapest of the other leaves, whether that is free or not.
     words, n_words = words_to(lib, section.free_heading)

@@ -39,6 +39,7 @@ from maneuver_automaton.search._kernels_connection import free_candidate
 from maneuver_automaton.search.arrays import Joint, LatticeArrays
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import NO_TRIM
+from maneuver_automaton.words._kernels_shortest import least_cost
 
 X, Y, HEADING, Z, TIME = range(5)  # columns of the points
 
@@ -99,17 +100,16 @@ def join(one: Improving, words: IntArray, n_words: int, i: int, j: int, gain: fl
     at = points.at
     start = (at[i, X], at[i, Y], at[i, HEADING], at[i, Z])
     goal = (at[j, X], at[j, Y], at[j, HEADING], at[j, Z])
-    # In the order of their price: the straight line at the least cost per metre, which no path
+    # In the order of their price: the shortest path at the least cost per metre, which no word
     # undercuts; words in closed form; the proof that one of them is free.
-    budget = points.best[j] - points.best[i]
-    if math.hypot(goal[0] - start[0], goal[1] - start[1]) * task.per_metre >= budget:
+    budget = points.best[j] - points.best[i] - gain
+    radius = 0.0 if task.free_heading and j == at.shape[0] - 1 else task.least_radius
+    if least_cost(radius, task.per_metre, start, goal, budget) >= budget:
         return
     here, there = trim_at(lib, word, i), trim_at(lib, word, j)
-    count = candidates(
-        lib.library, words, n_words, start, here, goal, there, budget - gain, scratch
-    )
+    count = candidates(lib.library, words, n_words, start, here, goal, there, budget, scratch)
     clock = limits.clock + points.spent[i]  # when the cheapest path gets to point i
-    joint = Joint(start, here[0], there[0], clock, task.tries, budget - gain, limits.most_time)
+    joint = Joint(start, here[0], there[0], clock, task.tries, budget, limits.most_time)
     which = free_candidate(one.scene, lib, words, joint, count, scratch)
     if which < 0:
         return

@@ -53,6 +53,7 @@ class ImproveTask(NamedTuple):
     given_ends: bool  # whether the word begins and ends in given trims
     per_metre: float  # least cost per metre, maneuvers included
     radius: float  # [m] length scale
+    least_radius: float  # [m] of turns, for `least_cost`; 0 where any is left to maneuvers
     shortest_span: float  # [s]
     snap: float  # chance of an end to snap to a switch
     via: float  # share of attempts with a via-point

@@ -22,6 +22,7 @@ from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import TRIES, limits_of
 from maneuver_automaton.search.lattice_trims import MOST_TRIMS
 from maneuver_automaton.words.library import SWITCH, scratch_of
+from maneuver_automaton.words.shortest import least_radius
 from maneuver_automaton.words.word import Word, word_of_steps
 
 POINTS = 40  # of the dynamic program, at equal times
@@ -139,6 +140,7 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
         given_ends=query.start_trim >= 0,
         per_metre=min(float(library.per_metre), least),
         radius=float(library.radius),
+        least_radius=least_radius(twists[:-1]) if library.at_will else 0.0,
         shortest_span=float(0.25 * library.radius / max(speed, 1e-9)),
         snap=SNAP,
         via=VIA,

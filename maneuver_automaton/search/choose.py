@@ -25,7 +25,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
-from maneuver_automaton.search.limits import three_are_enough
+from maneuver_automaton.search.limits import sole_shortest, three_are_enough
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
@@ -79,6 +79,10 @@ def search_goal(
     method = problem.search.method
     if problem.horizon.min_coast > 0.0:
         return [search_with_least_times(problem, goal, alternatives=alternatives, budget=budget)]
+    if method == "auto" and alternatives == 0 and known is None and not ties:
+        sole = sole_shortest(problem, goal)
+        if sole is not None:
+            return [SearchResult(status=SearchStatus.FOUND, solutions=(sole,), exhaustive=True)]
     upper_bound = math.inf
     if known is not None:
         upper_bound = problem.cost_of(known) if known_cost is None else known_cost

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import StageCost, prices_switches
@@ -16,9 +17,13 @@ from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.search.setup import SearchSetup, goal_from_start, is_still, search_setup
 from maneuver_automaton.words.library import moving_trims
+from maneuver_automaton.words.shortest import least_radius, reeds_shepp_length, shortest_paths
+from maneuver_automaton.words.word import Word
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
 CLEARLY = 1e-3  # share by which a price is higher that nobody takes for the same
+ALONE = 1e-6  # [rad] in which a goal differs from its images, if there is one shortest path
+LASTING = 1e-9  # [rad] of a part of a path that is one
 ALIKE = 1e-12  # relative, of prices and curvatures that are one but for rounding
 HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a path by
 
@@ -95,10 +100,10 @@ def _misses(directions: Array, goal: Array) -> bool:
 def closed_bound(problem: Problem, goal: Goal) -> float:
     """No plan that ends within the tolerance of `goal` is cheaper, whatever its word.
 
-    The largest of: the distance at the best price per metre, the turn at the best price per radian,
-    a fixed time at the best price per second, and, for a fixed time T,
-    ``k (distance^2 + turn^2) / T`` with the largest k for which no trim costs less than
-    ``k (speed^2 + turn rate^2)`` per second.
+    The largest of: the distance at the best price per metre, and the shortest path of a car at it;
+    the turn at the best price per radian; a fixed time at the best price per second, and, for a
+    fixed time T, ``k (distance^2 + turn^2) / T`` with the largest k for which no trim costs less
+    than ``k (speed^2 + turn rate^2)`` per second.
     The last one is the paper's bound on the effort, with k = c1 lambda_min(R) for the unicycle.
 
     Source: the paper, Appendix; Cauchy-Schwarz.
@@ -127,6 +132,10 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
         "distance": max((way * price for way, price in ways if way > 0.0), default=0.0),
         "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
     }
+    radius = least_radius(library.twists) if problem.automaton.is_kinematic else 0.0
+    if radius > 0.0 and not (goal.free_heading or goal.tolerance_m or goal.tolerance_rad):
+        length = float(reeds_shepp_length(relative[:3], radius=radius))
+        bounds["shortest"] = length * (1.0 - ALIKE) * prices.per_metre_level
     if limit is not None:
         bounds["effort"] = prices.per_square * (distance * distance + turn * turn) / limit
         if not pads:
@@ -177,6 +186,66 @@ def three_are_enough(problem: Problem) -> bool:
     cheapest = curvatures[prices <= prices.min(initial=np.inf) * (1.0 + ALIKE)]
     most = np.abs(curvatures).max(initial=0.0)
     return all((np.abs(cheapest - one) <= ALIKE * most).any() for one in (-most, 0.0, most))
+
+
+def sole_shortest(problem: Problem, goal: Goal) -> Word | None:
+    """The cheapest word to a goal in free space, where it follows the only shortest path of a car.
+
+    None for other libraries and conditions, and where another path is as short: where the goal is
+    an image of its own, and where no path turns in vain.
+    """
+    horizon, driven = problem.horizon, shortest_trims(problem.automaton, problem.cost)
+    limited = horizon.time is not None or horizon.max_time is not None or horizon.min_coast > 0.0
+    relative = goal_from_start(problem, goal)
+    if driven is None or limited or goal.free_heading or relative[3] != 0.0:
+        return None
+    pose = relative[:3] / [driven.radius, driven.radius, 1.0]
+    turn = math.remainder(float(pose[2]), 2.0 * math.pi)
+    c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
+    image = c * pose[0] + s * pose[1], c * pose[1] - s * pose[0], turn, math.pi - abs(turn)
+    turns, parts = shortest_paths(pose[None], 1.0)
+    metres = driven.radius * np.abs(parts[0])
+    vain = float(np.abs(parts).sum()) - abs(turn)
+    used = metres > driven.radius * LASTING
+    most = horizon.max_trims or used.size
+    if min(vain, *map(abs, image)) < ALONE or np.count_nonzero(used) > most:
+        return None
+    trims = driven.trims[turns[0][used] + 1, (parts[0][used] > 0.0).astype(int)]
+    return Word(
+        trims=trims,
+        durations=metres[used] / np.abs(problem.automaton.body_velocities[trims, 0]),
+        cost=float(metres[used].sum()) * driven.per_metre,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ShortestTrims:
+    """The trims that the shortest paths of a car are made of, the cheapest per metre of all."""
+
+    trims: IntArray  # (3, 2) right, straight, left; backwards and ahead
+    radius: float  # [m]
+    per_metre: float
+
+
+@kept_by_first
+def shortest_trims(automaton: Automaton, cost: StageCost) -> ShortestTrims | None:
+    """The trims of a car's shortest paths; None where one is missing, or two do the same."""
+    library = moving_trims(automaton, cost)
+    speeds, radius = library.twists[:, 0], least_radius(library.twists)
+    endless = all(trim.max_duration == math.inf for trim in automaton.trims)
+    at_will = automaton.is_kinematic and endless and not prices_switches(cost)
+    if radius == 0.0 or library.climbs or not at_will:
+        return None
+    prices, bends = library.rates / np.abs(speeds), radius * library.twists[:, 2] / speeds
+    least = float(prices.min())
+    trims = np.empty((3, 2), dtype=np.int64)
+    for side, gear in itertools.product((-1, 0, 1), (-1, 1)):
+        same = (np.abs(bends - side) <= ALIKE) & (speeds * gear > 0.0)
+        (rows,) = np.nonzero(same & (prices <= least * (1.0 + ALIKE)))
+        if rows.size != 1:
+            return None
+        trims[side + 1, (gear + 1) // 2] = library.trims[rows[0]]
+    return ShortestTrims(trims=trims, radius=radius, per_metre=least)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

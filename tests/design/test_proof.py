@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from maneuver_automaton.design import reeds_shepp_length
 from maneuver_automaton.design.proof import proven_factor, word_lengths
-from maneuver_automaton.design.reeds_shepp import reeds_shepp_length
 from tests.quickly import quick_are
 
 

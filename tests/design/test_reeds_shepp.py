@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.design import reeds_shepp_length
 from maneuver_automaton.design.proof import word_lengths
-from maneuver_automaton.design.reeds_shepp import families, reeds_shepp_length
+from maneuver_automaton.design.reeds_shepp import families
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.words import search_words

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,12 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
-from maneuver_automaton.search.limits import three_are_enough, why_impossible
+from maneuver_automaton.search.limits import (
+    closed_bounds,
+    sole_shortest,
+    three_are_enough,
+    why_impossible,
+)
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -124,3 +130,40 @@ def test_words_of_three_trims_are_enough_of_a_vehicle_that_drives_forward_alone(
     assert three_are_enough(problem) == enough
     result = plan(problem)
     assert (result.bound.kind == "exhaustive") == enough
+
+
+CAR = [(v, 0, 0.5 * side, 0) for v in (1, -1) for side in (1, 0, -1)]
+
+
+@pytest.mark.parametrize(
+    ("twists", "cost", "horizon", "goal", "sole"),
+    [
+        (CAR, LENGTH, Horizon(), (3, 1, 2), True),
+        (CAR, Cost(time=1.0), Horizon(), (-5, 9, 1), True),
+        ([*CAR, (1, 0, 0.2, 0), (0.5, 0, 0, 0)], Cost(time=1.0), Horizon(), (9, 1, -2), True),
+        (CAR, LENGTH, Horizon(), (1, 9, 0.1), True),  # of five trims
+        (CAR, LENGTH, Horizon(max_trims=3), (-9, 3, 3), False),
+        (CAR, LENGTH, Horizon(), (3, 0, 0), False),  # its own image
+        (CAR, LENGTH, Horizon(), (0.1, 0.2, 2), False),  # which no path turns in vain to
+        (CAR, LENGTH, Horizon(max_time=99.0), (3, 1, 2), False),
+        (CAR, Cost(length=1.0, switch=0.1), Horizon(), (3, 1, 2), False),
+        ([*CAR, (2, 0, 0, 0)], LENGTH, Horizon(), (3, 1, 2), False),  # at two speeds
+        (CAR[1:], LENGTH, Horizon(), (3, 1, 2), False),
+        ([*CAR, (0, 0, 1, 0)], LENGTH, Horizon(), (3, 1, 2), False),
+    ],
+)
+def test_the_only_shortest_path_of_a_car_is_what_a_search_of_words_finds(
+    twists, cost, horizon, goal, sole
+):
+    robot = library(*twists)
+    problem = Problem(robot, [0, 0, 0, 0], [*goal, 0], cost=cost, horizon=horizon)
+    word = sole_shortest(problem, problem.goals[0])
+    assert (word is not None) == sole
+    searched = plan(replace(problem, search=SearchSettings(method="insertion")))
+    assert max(closed_bounds(problem, problem.goals[0]).values()) <= searched.cost + 1e-9
+    if word is not None:
+        assert [robot.trim_names[k] for k in word.trims] == list(searched.plan.word)
+        assert word.cost == pytest.approx(searched.cost, rel=1e-11)
+        assert word.durations == pytest.approx(searched.plan.primitive_durations, abs=1e-6)
+        result = plan(problem)
+        assert (result.bound.kind, result.cost) == ("exhaustive", pytest.approx(word.cost))
