@@ -102,6 +102,19 @@ assert receding_horizon.Step.__module__ == "maneuver_automaton.receding_horizon.
     assert "maneuver_automaton.planning.plan" in modules_after(code)
 
 
+@pytest.mark.parametrize("when", ["register()", "entry.run = lambda _: register() or 2"])
+def test_what_is_registered_for_the_end_of_a_program_is_called(when):
+    code = f"""
+import atexit
+from maneuver_automaton.cli import entry
+register = lambda: atexit.register(print, "ended", flush=True) and None
+{when}
+entry.main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "ended\n")
+
+
 def test_values_are_those_of_their_rooms():
     from maneuver_automaton.groups import SE2
     from maneuver_automaton.planning import plan
