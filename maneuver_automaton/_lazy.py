@@ -39,11 +39,9 @@ def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
 def _homes(package: ModuleType) -> dict[str, str]:
     """The modules that a package imports names from, name by name, as its file states them."""
     assert package.__spec__ is not None
-    loader: Any = package.__spec__.loader
-    if (source := loader.get_source(package.__name__)) is None:
-        raise ImportError(
-            f"{package.__name__}: installed without its .py files, which say what it names"
-        )
+    loader, name = package.__spec__.loader, package.__name__
+    if (source := loader.get_source(name)) is None:  # type: ignore[union-attr]
+        raise ImportError(f"{name}: installed without its .py files, which say what it names")
     return {name: home for home, name in _IMPORT.findall(source)}
 
 

@@ -27,8 +27,15 @@ def run(argv: list[str]) -> int:
 def main() -> NoReturn:
     """Entry point of the console script."""
     ended: list[int] = []
+
+    def leave() -> None:  # to take every library apart takes longer than to load some
+        for code in ended:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+
     if not atexit._ncallbacks():  # else what was registered before would not be called
-        atexit.register(_leave, ended)  # after all that is registered from now on
+        atexit.register(leave)  # it is called after all that is registered from now on
     with listening():
         open_closed_streams()
         sys.meta_path.insert(0, LaterFinder)
@@ -38,11 +45,3 @@ def main() -> NoReturn:
         signal.signal(one, signal.SIG_IGN)  # the rest takes no time
     ended.append(code)
     sys.exit(code)
-
-
-def _leave(ended: list[int]) -> None:
-    """End the process as it is: to take every library apart takes longer than to load some."""
-    if ended:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(ended[0])
