@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import re
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
+from importlib.machinery import ModuleSpec, PathFinder
+from types import ModuleType
 from typing import Any
 
-_IMPORT = re.compile(r"^    from (\S+) import \(?\s*(\w+) as \2\b", re.MULTILINE)
+_IMPORT = re.compile(r"^(?:    )?from (\S+) import \(?\s*(\w+) as \2\b", re.MULTILINE)
+_ONE_AT_A_TIME = threading.RLock()
 
 
 def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -18,22 +23,98 @@ def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
     ``from module import name as name``.
     """
     module = sys.modules[package]
-    assert module.__spec__ is not None
-    loader: Any = module.__spec__.loader
-    if (source := loader.get_source(package)) is None:
-        raise ImportError(f"{package}: installed without its .py files, which say what it names")
-    homes = {name: home for home, name in _IMPORT.findall(source)}
+    homes = _homes(module)
 
     def get(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        within = homes[name] == package  # a module of its own
-        home = importlib.import_module(f"{package}.{name}" if within else homes[name])
-        value = home if within else getattr(home, name)
-        setattr(module, name, value)
-        return value
+        return _named(module, homes, name)
 
     def listed() -> list[str]:
         return sorted(homes.keys() | ({"__version__"} & vars(module).keys()))
 
     return get, listed
+
+
+def _homes(package: ModuleType) -> dict[str, str]:
+    """The modules that a package imports names from, name by name, as its file states them."""
+    assert package.__spec__ is not None
+    loader, name = package.__spec__.loader, package.__name__
+    if (source := loader.get_source(name)) is None:  # type: ignore[union-attr]
+        raise ImportError(f"{name}: installed without its .py files, which say what it names")
+    return {name: home for home, name in _IMPORT.findall(source)}
+
+
+def _named(package: ModuleType, homes: dict[str, str], name: str) -> Any:
+    """What a package imports by a name; it has it from now on."""
+    within = homes[name] == package.__name__  # a module of its own
+    home = importlib.import_module(f"{homes[name]}.{name}" if within else homes[name])
+    vars(package)[name] = home if within else getattr(home, name)
+    return vars(package)[name]
+
+
+class LaterFinder:
+    """Finds modules of this package, which run when they are asked for a name, and no sooner.
+
+    So a program does not run what it only might call: ``from package import module`` runs neither;
+    ``module.name`` and ``from module import name`` run the module, and no package on the way.
+    """
+
+    @staticmethod
+    def find_spec(
+        name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Where a module of this package is; None of others."""
+        if not name.startswith(f"{__package__}."):
+            return None
+        spec = PathFinder.find_spec(name, path, target)
+        if spec is not None and spec.loader is not None:
+            spec.loader_state = spec.loader.exec_module
+            spec.loader.exec_module = _put_off  # type: ignore[method-assign]
+        return spec
+
+
+def _put_off(module: ModuleType) -> None:
+    assert module.__spec__ is not None
+    is_package = module.__spec__.submodule_search_locations is not None
+    module.__spec__.loader_state = (
+        module.__spec__.loader_state,
+        _homes(module) if is_package else {},
+    )
+    module.__class__ = LaterModule
+
+
+class LaterModule(ModuleType):
+    """A module that has not run to its end; of a package, what it imports by name is there."""
+
+    def __getattr__(self, name: str) -> Any:
+        """A name that it imports, a module in it, or what it has once it has run."""
+        spec = self.__spec__
+        assert spec is not None
+        with _ONE_AT_A_TIME:
+            if name in vars(self):  # another thread asked for it meanwhile
+                return vars(self)[name]
+            if name.startswith("__") or spec.loader_state is None:  # it is running
+                raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+            run, homes = spec.loader_state
+            if name in homes:
+                return _named(self, homes, name)
+            if spec.submodule_search_locations is not None:
+                with contextlib.suppress(ModuleNotFoundError):
+                    return importlib.import_module(f"{self.__name__}.{name}")
+            spec.loader_state = None
+            try:
+                run(self)
+            except BaseException:
+                spec.loader_state = run, homes
+                raise
+            self.__class__ = ModuleType  # type: ignore[assignment]
+        return getattr(self, name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Have no module of a package hide what the package imports by the same name."""
+        spec = vars(self)["__spec__"]
+        if not (
+            isinstance(value, ModuleType) and spec.loader_state and name in spec.loader_state[1]
+        ):
+            super().__setattr__(name, value)

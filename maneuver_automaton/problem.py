@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maneuver_automaton import place_prices
 from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first, kept_with
@@ -30,10 +31,8 @@ from maneuver_automaton.costs import Cost, StageCost, check_cost, prices_switche
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations, group_of
 from maneuver_automaton.models import OnLattice, OnlyTranslated
 from maneuver_automaton.models.speeds import standing_price
-from maneuver_automaton.place_prices import PlacePrice, price_along
 from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
-from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.primitives.on_the_spot import state_of, trim_at
+from maneuver_automaton.primitives import Maneuver, Trim, on_the_spot
 from maneuver_automaton.via import Via as Via
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
@@ -487,7 +486,7 @@ class Problem:
         belongs to the trim, the start must have it: within a maneuver there is no first trim.
         """
         if self.start_state is not None:
-            return trim_at(self.automaton.model, self.start_state, "start state")
+            return on_the_spot.trim_at(self.automaton.model, self.start_state, "start state")
         if self.start_trim is not None and self.automaton.translated is not None:
             posed(self.automaton, self.start, "start", trim=self.start_trim)
         if self.start_trim is None and self.automaton.lattice is not None:
@@ -501,7 +500,7 @@ class Problem:
         under the start.
         """
         if goal.state is not None:
-            return trim_at(self.automaton.model, goal.state, "goal state")
+            return on_the_spot.trim_at(self.automaton.model, goal.state, "goal state")
         model = self.automaton.lattice
         if goal.trim is None and model is not None:
             begun = model.heading(self.first_trim.reduced_state)
@@ -544,7 +543,7 @@ class Problem:
             return invariant
         return invariant + sum(one.price for one in self.place_prices_of(plan))
 
-    def place_prices_of(self, plan: Plan) -> tuple[PlacePrice, ...]:
+    def place_prices_of(self, plan: Plan) -> tuple[place_prices.PlacePrice, ...]:
         """What a plan costs because of where it goes, for every one of the place costs.
 
         Examples
@@ -558,10 +557,11 @@ class Problem:
         [6.0]
         """
 
-        def prices() -> tuple[PlacePrice, ...]:
+        def prices() -> tuple[place_prices.PlacePrice, ...]:
             model, beside = self.automaton.model, self.invariant_cost_of(plan)
             costs = self.bound_place_costs
-            return tuple(price_along(cost, plan, model, beside=beside) for cost in costs)
+            price = functools.partial(place_prices.price_along, beside=beside)
+            return tuple(price(cost, plan, model) for cost in costs)
 
         return kept_with(plan, self.bound_place_costs, prices)
 
@@ -815,7 +815,7 @@ def settled_state(
             f"{what}: the trims of the {automaton.model.name} belong to headings, so it cannot "
             "start or end in a state between them; need a trim"
         )
-    known = state_of(automaton.model, state, what)
+    known = on_the_spot.state_of(automaton.model, state, what)
     here = [
         one for one in automaton.trims if np.abs(one.reduced_state - known).max() <= STATE_TOLERANCE
     ]
@@ -883,3 +883,20 @@ def _as_goals(value: Any) -> tuple[Goal, ...]:
     if poses.ndim not in (1, 2) or poses.size == 0:
         raise ValueError(f"goal: got shape {poses.shape}, need one pose or a list of poses")
     return tuple(Goal(pose=pose) for pose in np.atleast_2d(poses))
+
+
+def between_trims(problem: Problem) -> Problem:
+    """The problem without states at its ends, for what does not depend on them."""
+    return _between_trims(problem.setting) if problem.has_states else problem
+
+
+@kept_by_first
+def _between_trims(setting: Problem) -> Problem:
+    automaton = setting.automaton
+    name = automaton.trim_names[automaton.rest or 0]
+    goals = tuple(
+        replace(goal, state=None, trim=name) if goal.state is not None else goal
+        for goal in setting.goals
+    )
+    start = name if setting.start_state is not None else setting.start_trim
+    return replace(setting, start_state=None, start_trim=start, goals=goals)

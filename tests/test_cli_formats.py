@@ -117,7 +117,7 @@ def test_mpc_takes_its_loop_from_beside(folder, capsys, monkeypatch):
         seen.append((problem, options["step"]))
         raise ValueError("not tried")
 
-    monkeypatch.setattr(single, "simulate", simulate)
+    monkeypatch.setattr(single.receding_horizon, "simulate", simulate)
     assert quietly("mpc", "many/Case0.csv", "--with", "beside.yaml") == 2
     ((problem, step),) = seen
     assert step == 0.5

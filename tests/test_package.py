@@ -78,6 +78,30 @@ def test_a_star_brings_every_name_once():
     assert set(ma.__all__) <= set(namespace)
 
 
+def test_a_program_runs_no_module_that_it_asks_for_nothing():
+    code = """
+import sys
+from maneuver_automaton._lazy import LaterFinder
+sys.meta_path.insert(0, LaterFinder)
+import maneuver_automaton.planning.plan  # which must not hide the function of this name
+from maneuver_automaton import planning, receding_horizon
+from maneuver_automaton.planning import plan, plans, result
+assert plan.__module__ == plans.__module__ == "maneuver_automaton.planning.plan"
+assert planning.plan is plan is vars(sys.modules[plan.__module__])["plan"]
+waits = [name for name, one in sys.modules.items() if type(one).__name__ == "LaterModule"]
+assert "maneuver_automaton.receding_horizon" in waits and result.__name__ not in waits
+for name in "planning.unheard", "planning.plan.unheard", "receding_horizon.unheard":
+    try:
+        __import__("operator").attrgetter(name)(maneuver_automaton)
+    except AttributeError as error:
+        assert "has no attribute 'unheard'" in str(error), error
+    else:
+        raise AssertionError(name)
+assert receding_horizon.Step.__module__ == "maneuver_automaton.receding_horizon.log"
+"""
+    assert "maneuver_automaton.planning.plan" in modules_after(code)
+
+
 def test_values_are_those_of_their_rooms():
     from maneuver_automaton.groups import SE2
     from maneuver_automaton.planning import plan

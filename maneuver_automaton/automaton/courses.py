@@ -18,8 +18,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trajectory
-from maneuver_automaton.primitives.connecting import pieces
+from maneuver_automaton.primitives import Maneuver, Trajectory, connecting
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.primitive import CLOSED
 
@@ -163,7 +162,7 @@ def _driven_together(
 
 def inputs_of(course: Trajectory) -> Inputs:
     """Until when (n,) [s] each control (n, n_u) holds."""
-    parts = pieces(course.time, course.control)
+    parts = connecting.pieces(course.time, course.control)
     until = np.array([end for _, end, _ in parts])
     even = even_times(float(course.time[-1]), len(parts))
     is_even = np.abs(until - even).max(initial=0.0) <= EVEN * course.time[-1]

@@ -8,6 +8,7 @@ import sys
 from typing import NoReturn
 
 from maneuver_automaton._interrupts import listening
+from maneuver_automaton._lazy import LaterFinder
 from maneuver_automaton.cli.streams import open_closed_streams
 
 # Importing and planning make 250,000 objects and hardly any garbage; to look for it takes 30 ms.
@@ -25,6 +26,7 @@ def main() -> NoReturn:
     """Entry point of the console script."""
     with listening():
         open_closed_streams()
+        sys.meta_path.insert(0, LaterFinder)
         gc.set_threshold(COLLECT_EVERY)
         code = run(sys.argv[1:])
     for one in (signal.SIGINT, signal.SIGTERM):

@@ -20,19 +20,12 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.cli.guard import complain
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
-from maneuver_automaton.formats.commonroad import n_problems
-from maneuver_automaton.formats.libraries import read_primitives
+from maneuver_automaton.formats import commonroad, libraries
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.models.model import check_model
 from maneuver_automaton.plotting.look import Look, size_of
-from maneuver_automaton.scenario import (
-    FleetScenario,
-    RoadScenario,
-    Scenario,
-    load_scenario,
-    remarks_on,
-)
+from maneuver_automaton.scenario import RoadScenario, Scenario, fleet, load_scenario, remarks_on
 
 OF_LOOPS = re.compile(r"^(receding horizon: |fleet horizon: |fleet: )+")  # a file says it better
 
@@ -49,14 +42,14 @@ class Parts:
 def states_several(path: Path, parts: Parts) -> bool:
     """Whether a file of CommonRoad states several problems, and --case picks none of them."""
     try:
-        return parts.case is None and n_problems(path) > 1
+        return parts.case is None and commonroad.n_problems(path) > 1
     except OSError:
         return False  # told by who reads it
 
 
 def problem_of(
     path: Path, parts: Parts | None = None, *, remark: bool = True
-) -> Scenario | FleetScenario:
+) -> Scenario | fleet.FleetScenario:
     """The problem or fleet of a file, completed by `parts`; remarks on what is hardly meant."""
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
@@ -87,7 +80,7 @@ def automaton_of(path: Path, model: str | None = None) -> Automaton:
 def named_automaton(path: Path, model: str | None = None) -> tuple[Automaton, str]:
     """The automaton of a file, see `automaton_of`, and the name of the scenario or library."""
     own = None if model is None else user_model(model)
-    if (read := read_primitives(path)) is not None:
+    if (read := libraries.read_primitives(path)) is not None:
         if own is not None:
             raise InvalidScenario(
                 f"--model: {path} is a file of {read.kind}, which has a vehicle of its own; need a "

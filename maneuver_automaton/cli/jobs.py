@@ -12,7 +12,7 @@ from typing import Any
 
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._kernel_list import load_kernels
-from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
+from maneuver_automaton.cli import folder_runs
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import (
     Options,
@@ -27,10 +27,10 @@ from maneuver_automaton.cli.inputs import (
 from maneuver_automaton.cli.pictures import draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.commonroad import is_road
 from maneuver_automaton.formats.documents import write_document
+from maneuver_automaton.formats.registry import is_road
 from maneuver_automaton.recording import Fact, recording_of, tables_of
-from maneuver_automaton.scenario import FleetScenario
+from maneuver_automaton.scenario import Scenario
 
 NEAR = ("clearance", "least clearance", "apart")  # facts that are distances
 INTERRUPTED = "interrupted before there was a plan"
@@ -75,12 +75,12 @@ class JobResult:
         for line in self.remarks:
             console().print(f"  {line}", soft_wrap=True)
 
-    def row(self, path: Path, *, known: bool) -> Row:
+    def row(self, path: Path, *, known: bool) -> folder_runs.Row:
         """For the table of a folder; with its numbers, if they are `known`."""
         found = {one.label: one.value for one in self.all_facts if not isinstance(one.value, str)}
         numbers = found if known else {}
         near = [numbers[one] for one in NEAR if one in numbers]
-        return Row(
+        return folder_runs.Row(
             name=path.name,
             code=FOUND if self.done else NO_PLAN,
             status=self.status,
@@ -106,7 +106,7 @@ class Job:
         kind, scenario = self._read()
         refuse_unknown(self.path, self.command, kind, self.options, self.parts)
         if kind == "fleet":
-            check_address(self.options.scheduler)
+            folder_runs.check_address(self.options.scheduler)
         make_folder(out)
         home = "single" if kind == "one" else "fleets" if kind == "fleet" else "roads"
         work = getattr(importlib.import_module(f"{__package__}.{home}"), WORK[self.command])
@@ -134,7 +134,7 @@ class Job:
                 f"{self.path}: receding_horizon: missing, need {{step_s: ...}}, the time between "
                 "two plans"
             )
-        return ("fleet" if isinstance(scenario, FleetScenario) else "one"), scenario
+        return ("one" if isinstance(scenario, Scenario) else "fleet"), scenario
 
     def drawn(self, outcome: JobResult, out: Path) -> None:
         """Write the pictures that were asked for, in this process."""
@@ -196,8 +196,8 @@ def _run_file(job: Job, out: Path) -> int:
 def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: Parts) -> int:
     if options.resume is not None:
         raise InvalidScenario("--resume: goes on with one loop, and a folder has many; need a file")
-    check_address(options.scheduler)
-    problems = problems_in(folder, parts)
+    folder_runs.check_address(options.scheduler)
+    problems = folder_runs.problems_in(folder, parts)
     if command == "mpc":
         problems = [one for one in problems if _has_loop(*one)]
         if not problems:
@@ -209,7 +209,7 @@ def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: 
         with announced(quiet=options.quiet):
             load_kernels("words", "insertion", "lattice", "improvement")
 
-    return run_folder(
+    return folder_runs.run_folder(
         functools.partial(_row, command=command, out=out, options=alone, folder=Path.cwd()),
         problems,
         out,
@@ -233,13 +233,13 @@ def _has_loop(path: Path, parts: Parts) -> bool:
 
 def _row(
     problem: tuple[Path, Parts], *, command: str, out: Path, options: Options, folder: Path
-) -> tuple[Path, Row]:
+) -> tuple[Path, folder_runs.Row]:
     """Do the job of one file of a folder; what goes wrong is told in its row."""
     path, parts = problem
-    out = out / path.stem
+    row, out = folder_runs.Row, out / path.stem
     if stopped():
         reason = f"{path}: interrupted before it was {WORK[command]}"
-        return path, Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
+        return path, row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
     try:
         with contextlib.chdir(folder):
             job = Job(command=command, path=path, parts=parts, options=options)
@@ -247,5 +247,5 @@ def _row(
             job.drawn(outcome, out)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         reason = explained(error)
-        return path, Row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
+        return path, row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
     return path, outcome.row(path, known=outcome.done or command == "mpc")

@@ -131,7 +131,7 @@ def _serve(read: int) -> None:
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
         ready_to_draw()
-        from maneuver_automaton.plotting import pictures  # noqa: F401
+        from maneuver_automaton.plotting.pictures import figure_of  # noqa: F401
 
         with os.fdopen(read, "rb") as pipe:
             order = pipe.read()

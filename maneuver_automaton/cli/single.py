@@ -6,22 +6,16 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from maneuver_automaton import planning
+from maneuver_automaton import planning, receding_horizon
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli.inputs import naming
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.terminal import counted, has_terminal, progress_bar, waiting
-from maneuver_automaton.formats.closed_loop_json import (
-    closed_loop_to_dict,
-    load_steps,
-    statistics_to_dict,
-)
+from maneuver_automaton.formats import closed_loop_json
 from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
-from maneuver_automaton.recording import recording_of
-from maneuver_automaton.recording.loops import causes, statistics_facts
+from maneuver_automaton.recording import loops, recording_of
 from maneuver_automaton.scenario import Scenario
 from maneuver_automaton.scenario.scenario import disturbance_of
 
@@ -120,26 +114,27 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
         how["disturbance"] = None if noise is None else disturbance_of(noise, seed=options.seed)
         problem, last = scenario.problem, None
         if options.resume is not None:
-            done, poses = load_steps(options.resume, problem.automaton)
+            done, poses = closed_loop_json.load_steps(options.resume, problem.automaton)
             if done:
                 last, problem = done[-1], replace(problem, start=poses[-1])
         with progress_bar("steps", steps, quiet=options.quiet) as advance:
-            loop = simulate(problem, **how, last=last, progress=lambda _: advance())
+            how |= {"last": last, "progress": lambda _: advance()}
+            loop = receding_horizon.simulate(problem, **how)
     return _driven(loop, scenario.name)
 
 
-def _driven(loop: ClosedLoop, name: str) -> JobResult:
+def _driven(loop: receding_horizon.ClosedLoop, name: str) -> JobResult:
     broken = [f"step {n} broke a guarantee: {one}" for n, one in loop.violations]
     disturbed = [
         f"step {n} was disturbed: {one}"
         for n, one in loop.disturbed
-        if one.guarantee is not Guarantee.DECREASE  # what noise does, in every other step
+        if one.guarantee is not receding_horizon.Guarantee.DECREASE  # as by noise all the time
     ]
     missed = [] if loop.reached else [f"{loop.status}: {loop.reason}"]
     return JobResult(
         name=name,
         result=loop,
-        document=closed_loop_to_dict(loop, name=name),
+        document=closed_loop_json.closed_loop_to_dict(loop, name=name),
         done=loop.reached and not any(loop.collisions),
         status=loop.status,
         complaints=(*broken, *disturbed, *missed),
@@ -151,7 +146,7 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     assert count is not None
     first = options.seed or 0
     with progress_bar("loops", count, quiet=options.quiet) as advance:
-        statistics = simulate_many(
+        statistics = receding_horizon.simulate_many(
             scenario.problem,
             seeds=range(first, first + count),
             **how,
@@ -163,10 +158,10 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     return JobResult(
         name=scenario.name,
         result=None,  # the motion of no loop is kept
-        document=statistics_to_dict(statistics),
+        document=closed_loop_json.statistics_to_dict(statistics),
         done=all(one.reached and not any(one.collisions) for one in statistics.outcomes),
         status=f"{count} loops",
-        facts=statistics_facts(statistics),
-        remarks=tuple(causes(statistics)),
+        facts=loops.statistics_facts(statistics),
+        remarks=tuple(loops.causes(statistics)),
         file="statistics",
     )

@@ -14,7 +14,6 @@ from maneuver_automaton._arrays import as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop
-from maneuver_automaton.formats.commonroad import is_road
 from maneuver_automaton.formats.documents import checked, errors_at, kind_of, parsed
 from maneuver_automaton.formats.fleet_json import load_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
@@ -24,6 +23,7 @@ from maneuver_automaton.formats.plan_json import (
     load_result,
     plan_of_document,
 )
+from maneuver_automaton.formats.registry import is_road
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
 from maneuver_automaton.recording.plans import stated

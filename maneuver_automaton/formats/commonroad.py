@@ -63,11 +63,6 @@ def is_commonroad(path: Path) -> bool:
     return root_tag(path) == ROOT
 
 
-def is_road(path: Path) -> bool:
-    """Whether a file is one of CommonRoad, by its ending."""
-    return path.suffix.lower() == ".xml"
-
-
 def n_problems(path: Path) -> int:
     """How many planning problems a file states, as far as it is valid XML."""
     return tags_below_root(path)["planningProblem"]

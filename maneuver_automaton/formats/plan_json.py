@@ -13,11 +13,11 @@ from typing import Annotated, Any, Literal, NotRequired, cast
 import numpy as np
 from typing_extensions import TypedDict
 
+from maneuver_automaton import bounds
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
-from maneuver_automaton.bounds.separation import Narrowest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     FLEET,
@@ -407,7 +407,7 @@ def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> P
             improvements=tuple(
                 (float(at), float(cost)) for at, cost in document.get("improvements", ())
             ),
-            narrowest=passage and made(Narrowest, passage, NarrowestEntry),
+            narrowest=passage and made(bounds.Narrowest, passage, NarrowestEntry),
             notes=tuple(document.get("notes", ())),
             **cast("Any", {key: document.get(key) for key in same}),
         )

@@ -120,6 +120,11 @@ BELONG: Mapping[str, str] = {  # to a problem that they do not state: files with
 }
 
 
+def is_road(path: Path) -> bool:
+    """Whether a file is one of CommonRoad, by its ending."""
+    return path.suffix.lower() == ".xml"
+
+
 @functools.cache
 def from_outside() -> tuple[FileFormat, ...]:
     """The formats that other packages bring, by the names of their entry points."""

@@ -18,7 +18,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import FARTHEST
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.roads import RoadScene
+from maneuver_automaton.roads import scene
 
 Unknown: TypeAlias = Literal["blocked", "free"]
 
@@ -59,7 +59,7 @@ class Statement:
     footprint: tuple[Shape, ...] | None = None
     vehicle: StatedVehicle | None = None
     maps: tuple[MapFile, ...] = ()  # those of the obstacles that are in the format of Nav2
-    road: RoadScene | None = None  # lanelets, traffic, start and goals of a drive on roads
+    road: scene.RoadScene | None = None  # lanelets, traffic, start and goals of a drive on roads
     fleet: tuple[Statement, ...] = ()  # of several vehicles: what is stated of each, by its name
 
 

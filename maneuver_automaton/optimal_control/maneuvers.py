@@ -17,6 +17,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit
+from maneuver_automaton.optimal_control import problem as programs
+from maneuver_automaton.optimal_control import transcription
 from maneuver_automaton.optimal_control.ipopt import (
     STATUS,
     SolverSettings,
@@ -25,13 +27,6 @@ from maneuver_automaton.optimal_control.ipopt import (
     load_casadi,
     numpy_on_symbols,
 )
-from maneuver_automaton.optimal_control.problem import (
-    OptimalControlProblem,
-    TimeGrid,
-    control_scale,
-    resampled,
-)
-from maneuver_automaton.optimal_control.transcription import transcribe
 
 WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
@@ -162,11 +157,11 @@ def transfer_program(
     began = time.perf_counter()
     casadi = load_casadi()
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
-    n_z, scale = len(model.reduced_names), control_scale(model)
+    n_z, scale = len(model.reduced_names), programs.control_scale(model)
     if not n_z:
         raise ValueError(f"{model.name}: has no reduced state, so its trims need no maneuvers")
     n_u, n_stages, steps = len(model.control_names), settings.intervals, settings.steps
-    problem = OptimalControlProblem(
+    problem = programs.OptimalControlProblem(
         state_names=model.reduced_names,
         control_names=model.control_names,
         dynamics=model.dynamics,
@@ -177,7 +172,8 @@ def transfer_program(
             objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
         ),
     )
-    one = transcribe(problem, TimeGrid(n_nodes=steps + 1, rule="rk4", held=steps))
+    grid = programs.TimeGrid(n_nodes=steps + 1, rule="rk4", held=steps)
+    one = transcription.transcribe(problem, grid)
 
     def too_fast(states: Any, control: Any) -> Any:  # rows that must not be positive
         if not math.isfinite(lateral_limit(model)):
@@ -270,8 +266,8 @@ def solve_transfer(
     within[:, 0] = np.minimum(within[:, 0], np.minimum(start, end))
     within[:, 1] = np.maximum(within[:, 1], np.maximum(start, end))
     guess_s = duration_guess(model, start, end) if duration is None else duration
-    inputs = resampled(controls, count)
-    path = resampled(np.array([start, end]), count * settings.steps + 1)
+    inputs = programs.resampled(controls, count)
+    path = programs.resampled(np.array([start, end]), count * settings.steps + 1)
     if swing:
         room = np.where(np.isfinite(controls_within), controls_within, np.array([-1.0, 1.0]))
         low, high = room.T[:, None] - inputs

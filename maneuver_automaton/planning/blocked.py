@@ -6,18 +6,15 @@ import math
 from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import AnyObstacle, Disc
-from maneuver_automaton.collision.advancement import clearances
-from maneuver_automaton.collision.blocked import touched, touched_all_round
+from maneuver_automaton.collision import AnyObstacle, Disc, advancement, fcl_checker, layers
+from maneuver_automaton.collision import blocked as exactly
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.fcl_checker import origin_near
-from maneuver_automaton.collision.layers import layers_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
+from maneuver_automaton.search import scene
 from maneuver_automaton.search.lattice_goals import nearest_on_lattice
 from maneuver_automaton.search.limits import outside
-from maneuver_automaton.search.scene import CLEARLY, ends_of, world_around
 
 LEAVES = "`plan --leave`, or plan(problem, leave=True), drives out of what a start touches first"
 
@@ -31,8 +28,8 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     reason, notes = outside(problem.start, problem.bounds), tuple[str, ...]()
     sure = [False] * (1 + len(problem.goals))  # proven free by the kernels, all in one call
     if problem.obstacles and not (problem.parts or problem.start.size > 3 or problem.moves):
-        aside = ends_of(problem)[1].tolist()
-        sure = [one > problem.margin + CLEARLY for one in aside]
+        aside = scene.ends_of(problem)[1].tolist()
+        sure = [one > problem.margin + scene.CLEARLY for one in aside]
     if reason:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles and not sure[0]:
@@ -59,9 +56,9 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
 
 def proven_free(problem: Problem, poses: Array) -> list[bool]:
     """Whether the kernels prove poses in the plane free of all that stands, all in one call."""
-    world = world_around(problem)
-    aside = clearances(world, world.into(poses)).tolist()
-    return [one > problem.margin + CLEARLY for one in aside]
+    world = scene.world_around(problem)
+    aside = advancement.clearances(world, world.into(poses)).tolist()
+    return [one > problem.margin + scene.CLEARLY for one in aside]
 
 
 def why_goal_blocked(problem: Problem, goal: Goal, *, free: bool = False) -> str:
@@ -91,7 +88,8 @@ def _why_blocked_all_round(problem: Problem, goal: Goal) -> str:
             return f"at the goal {said}"
     said = where_touched(problem, goal.pose, math.inf)
     still = tuple(one for one in _at_altitude(problem, goal.pose) if not moves(one))
-    if said and touched_all_round(problem.footprint, still, goal.pose[:2], margin=problem.margin):
+    body, margin = problem.footprint, problem.margin
+    if said and exactly.touched_all_round(body, still, goal.pose[:2], margin=margin):
         return f"at the goal no heading is free; at that given {said}"
     return ""
 
@@ -138,17 +136,17 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
     at = time if math.isfinite(time) else 0.0
     if pose.size == 3:
         whole = obstacles == problem.obstacles
-        world = world_around(problem if whole else replace(problem, obstacles=obstacles))
-        (clearance,) = clearances(world, world.into(pose[:3]), times=at)
-        if clearance > problem.margin + CLEARLY:
+        world = scene.world_around(problem if whole else replace(problem, obstacles=obstacles))
+        (clearance,) = advancement.clearances(world, world.into(pose[:3]), times=at)
+        if clearance > problem.margin + scene.CLEARLY:
             return ""
-    return touched(
+    return exactly.touched(
         problem.footprint,
         obstacles,
         pose[:3],
         time=at,
         margin=problem.margin,
-        origin=origin_near(pose[:2]),
+        origin=fcl_checker.origin_near(pose[:2]),
     )
 
 
@@ -158,7 +156,7 @@ def _at_altitude(problem: Problem, pose: Array) -> tuple[AnyObstacle, ...]:
         return problem.obstacles
     near = [
         number
-        for layer in layers_of(problem.obstacles, in_space=True)
+        for layer in layers.layers_of(problem.obstacles, in_space=True)
         if layer.clearance(pose[3:], problem.body_height)[0] <= problem.margin
         for number in layer.numbers
     ]

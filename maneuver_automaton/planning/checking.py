@@ -15,25 +15,21 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit import Audit, StatedPrices, audit_plan, closest_to, origin_of
-from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.cutting import carried
+from maneuver_automaton.automaton import Automaton, Plan, cutting
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.collision import Box, Obstacle, Zone
-from maneuver_automaton.collision.blocked import too_close
-from maneuver_automaton.collision.fcl_checker import Course, FclChecker, origin_near
+from maneuver_automaton.collision import Box, Obstacle, Zone, blocked, fcl_checker
 from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.places import Clearance
 from maneuver_automaton.planning.on_the_way import what_is_missed
 from maneuver_automaton.planning.result import Workspace, workspace_of
-from maneuver_automaton.primitives import Trim
-from maneuver_automaton.primitives.closed_form import may_drive
+from maneuver_automaton.primitives import Trim, closed_form
 from maneuver_automaton.primitives.primitive import Trajectory
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.refinement.fitting import broken_condition
+from maneuver_automaton.search import scene
 from maneuver_automaton.search.limits import stays_inside
-from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
 AUDIT_S, SAMPLE_S = 5e-3, 1.5e-5  # [s] that an audit takes, in all and a sample among obstacles
@@ -85,7 +81,7 @@ def check_plan(
     if reason:
         return Checked(audit=None, broken=Condition.WORD, reason=reason)
     for maneuver in plan.maneuvers:
-        if maneuver is not None and not may_drive(problem.automaton.model, maneuver):
+        if maneuver is not None and not closed_form.may_drive(problem.automaton.model, maneuver):
             reason = f"the wheels turn while the vehicle stands, in maneuver {maneuver.name!r}"
             return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
@@ -136,7 +132,7 @@ def check_plan(
         return Checked(audit=None, broken=Condition.TIME)
     broken = None if audit.passed else Condition.AUDIT
     clearance = math.inf if audit.min_clearance_m is None else audit.min_clearance_m
-    if problem.moves and broken and clearance <= too_close(problem.margin):
+    if problem.moves and broken and clearance <= blocked.too_close(problem.margin):
         broken = Condition.COLLISION
     return Checked(audit=audit, broken=broken, reason=audit.reason)
 
@@ -149,7 +145,7 @@ def what_passes_later(problem: Problem, plan: Plan) -> str:
         return ""
     bodies = [("", plan.end, problem.footprint)]
     for name, shapes in problem.parts.items():
-        part = carried(plan, problem.automaton.model, name)
+        part = cutting.carried(plan, problem.automaton.model, name)
         bodies.append((f"the {name}: ", part.end, shapes))
     still = Trim(name="at the goal", body_velocity=np.zeros(3), control=np.zeros(2))
     for what, pose, shapes in bodies:
@@ -160,7 +156,7 @@ def what_passes_later(problem: Problem, plan: Plan) -> str:
                 continue
             moving = tuple(one for one in layer.obstacles if moves(one))
             least = closest_to(stands, Unicycle(), moving, footprint=shapes)
-            if least.distance <= too_close(problem.margin):
+            if least.distance <= blocked.too_close(problem.margin):
                 return f"{what}at {least.time:.6g} s an obstacle comes too near to where it stays"
     return ""
 
@@ -217,7 +213,7 @@ def what_is_hit(
         footprint=problem.footprint,
         parts=problem.parts,
         body_height=problem.body_height,
-        enough=too_close(problem.margin),
+        enough=blocked.too_close(problem.margin),
         ask=lambda: _ask(budget),
     )
     if least.obstacle < 0:
@@ -252,7 +248,8 @@ def _static_hit(
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
         _ask(budget)
-        bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))
+        part = cutting.carried(plan, problem.automaton.model, name)
+        bodies.append((f"the {name}: ", part, shapes))
     layers = layers_of(problem.obstacles, in_space=plan.start.size > 3)
     for what, moving, shapes in bodies:
         for layer in layers:
@@ -269,7 +266,7 @@ def _static_hit(
 
 
 def _what_hits(
-    checker: FclChecker, plan: Plan, layer: Layer, problem: Problem, budget: Budget
+    checker: fcl_checker.FclChecker, plan: Plan, layer: Layer, problem: Problem, budget: Budget
 ) -> str:
     """Which primitive hits what of a layer, while its altitude is within reach of it."""
     if not plan.primitives:
@@ -295,10 +292,10 @@ def _what_hits(
 
 def _courses_within_reach(
     plan: Plan, layer: Layer, problem: Problem, *, before: int
-) -> tuple[list[int], list[Course], str]:
+) -> tuple[list[int], list[fcl_checker.Course], str]:
     """What may come near a layer before a primitive, and the first maneuver without a course."""
     numbers: list[int] = []
-    courses: list[Course] = []
+    courses: list[fcl_checker.Course] = []
     for k, primitive in enumerate(plan.primitives[:before]):
         if isinstance(primitive, Trim):
             continue
@@ -308,7 +305,7 @@ def _courses_within_reach(
         start = plan.switching_poses[k]
         for rows in _rows_within_reach(course, start, layer, problem):
             numbers.append(k)
-            courses.append(Course(start[:3], course.pose[rows, :3]))
+            courses.append(fcl_checker.Course(start[:3], course.pose[rows, :3]))
     return numbers, courses, ""
 
 
@@ -357,7 +354,7 @@ def _rows_within_reach(
 
 
 def _origin(goal: Goal) -> tuple[float, float]:
-    return origin_near(goal.pose[:2])
+    return fcl_checker.origin_near(goal.pose[:2])
 
 
 def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:
@@ -369,10 +366,11 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
     """
     model = problem.automaton.model
     bodies = [(plan, problem.footprint)]
-    bodies += [(carried(plan, model, name), shapes) for name, shapes in problem.parts.items()]
+    for name, shapes in problem.parts.items():
+        bodies.append((cutting.carried(plan, model, name), shapes))
     for zone in problem.zones:
         for moving, shapes in bodies:
-            checker = FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
+            checker = fcl_checker.FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
             number = _first_forbidden(zone, checker, plan, moving, model)
             if number is not None:
                 return f"{zone.words} does not admit {_named(plan, number)}"
@@ -380,13 +378,13 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
 
 
 def _first_forbidden(
-    zone: Zone, checker: FclChecker, plan: Plan, moving: Plan, model: Model
+    zone: Zone, checker: fcl_checker.FclChecker, plan: Plan, moving: Plan, model: Model
 ) -> int | None:
     """The first primitive that touches a zone with one body where it is not admitted."""
     trims = [
         k
         for k, own in enumerate(plan.primitives)
-        if isinstance(own, Trim) and not piece_is_admitted(zone, own)
+        if isinstance(own, Trim) and not scene.piece_is_admitted(zone, own)
     ]
     twists = [moving.primitives[k].body_velocity[:3] for k in trims]  # type: ignore[union-attr]
     hit = checker.motions_hit(
@@ -396,7 +394,7 @@ def _first_forbidden(
     )
     first = None if hit is None else trims[hit[0]]
     numbers: list[int] = []
-    courses: list[Course] = []
+    courses: list[fcl_checker.Course] = []
     unknown = None  # the first maneuver of which nobody knows where it leads
     for k, (own, seen) in enumerate(zip(plan.primitives, moving.primitives, strict=True)):
         if isinstance(own, Trim) or isinstance(seen, Trim) or (first is not None and k > first):
@@ -405,10 +403,10 @@ def _first_forbidden(
             unknown = k
             break
         start = moving.switching_poses[k, :3]
-        forbidden = np.r_[False, ~admitted_stretches(zone, own, model), False]
+        forbidden = np.r_[False, ~scene.admitted_stretches(zone, own, model), False]
         for first_row, end in np.flatnonzero(np.diff(forbidden)).reshape(-1, 2).tolist():
             numbers.append(k)
-            courses.append(Course(start, seen.course.pose[first_row : end + 1, :3]))
+            courses.append(fcl_checker.Course(start, seen.course.pose[first_row : end + 1, :3]))
     entered = checker.courses_hit(courses)
     found = [first, unknown, None if entered is None else numbers[entered[0]]]
     return min((one for one in found if one is not None), default=None)

@@ -11,19 +11,18 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning import bounds
 from maneuver_automaton.planning.blocked import goals_left
-from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.checking import Condition, load_checking
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search import linked_words, word_setup
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import insertion_stages, load_search, search_goal
 from maneuver_automaton.search.limits import outside, why_impossible
-from maneuver_automaton.search.linked_words import ALPHABET
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, plan_of
-from maneuver_automaton.search.word_setup import word_setup
-from maneuver_automaton.words.maneuver_words import maneuver_words
+from maneuver_automaton.words import maneuver_words as of_maneuvers
 from maneuver_automaton.words.word import Word, word_of_plan
 
 WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
@@ -138,7 +137,7 @@ class AllWords(PlanningStep):
         elif self.proven and not any(one.tolerance_m or one.tolerance_rad for one in problem.goals):
             ended.bound = LowerBound(value=self.candidates[0].cost, kind="exhaustive")
         else:
-            ended.bound = formula_bound(problem)
+            ended.bound = bounds.formula_bound(problem)
 
     def _why_none(self, found: Incumbents) -> tuple[PlanStatus, str]:
         problem, refused = found.problem, found.refused
@@ -234,7 +233,7 @@ class LinkedWords(FreeWords):
         load_checking()
         load_kernels("words", "linked words")
         for goal in problem.goals:
-            word_setup(problem, goal, most_trims=ALPHABET, steers=True)
+            word_setup.word_setup(problem, goal, most_trims=linked_words.ALPHABET, steers=True)
 
 
 class TurnedByManeuvers(PlanningStep):
@@ -251,7 +250,7 @@ class TurnedByManeuvers(PlanningStep):
         def plans() -> Iterator[tuple[Plan, int]]:
             for index in goals_left(problem):
                 part = found.budget.stage(WORDS_SHARE)
-                for plan in maneuver_words(
+                for plan in of_maneuvers.maneuver_words(
                     problem, problem.goals[index], others=OTHERS, budget=part
                 ):
                     yield plan, index

@@ -32,7 +32,7 @@ from maneuver_automaton.primitives.on_the_spot import (
     seconds_between,
     trim_at,
 )
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Problem, between_trims
 from maneuver_automaton.search.limits import closed_bound, stays_inside
 
 NEAREST = 3  # trims that are tried besides rest
@@ -310,20 +310,3 @@ def _one_of_each_class(automaton: Automaton) -> Sequence[Trim]:
 
 def _restless(trim: Trim) -> tuple[bool, float]:
     return not trim.is_rest, float(np.abs(trim.control).sum())
-
-
-def between_trims(problem: Problem) -> Problem:
-    """The problem without states at its ends, for what does not depend on them."""
-    return _between_trims(problem.setting) if problem.has_states else problem
-
-
-@kept_by_first
-def _between_trims(setting: Problem) -> Problem:
-    automaton = setting.automaton
-    name = automaton.trim_names[automaton.rest or 0]
-    goals = tuple(
-        replace(goal, state=None, trim=name) if goal.state is not None else goal
-        for goal in setting.goals
-    )
-    start = name if setting.start_state is not None else setting.start_trim
-    return replace(setting, start_state=None, start_trim=start, goals=goals)

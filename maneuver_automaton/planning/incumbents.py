@@ -33,8 +33,8 @@ from maneuver_automaton.refinement.fitting import (
     padded,
     with_lasting_coasts,
 )
-from maneuver_automaton.search.beginning import Begun
-from maneuver_automaton.search.lattice import FirstPlan
+from maneuver_automaton.search import beginning
+from maneuver_automaton.search import lattice as lattice_search
 from maneuver_automaton.search.limits import stays_inside
 
 ROUNDING = 1e-12  # relative, of sums of costs
@@ -92,8 +92,8 @@ class Ending:
     nodes: Array | None = None  # expanded ones, if asked for
     proof: str = ""  # why no plan can exist
     remark: str = ""  # what came of the paths of a simpler vehicle
-    begun: Begun | None = None  # a search of the lattice that is under way
-    lattice: FirstPlan | None = None  # how its search for a first plan ended
+    begun: beginning.Begun | None = None  # a search of the lattice that is under way
+    lattice: lattice_search.FirstPlan | None = None  # how its search for a first plan ended
     finds_plans: bool = False  # words of the lattice are plans, which the checks only confirm
 
 

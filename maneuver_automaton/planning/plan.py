@@ -15,18 +15,13 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_with
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
+from maneuver_automaton.planning import leaving, no_way, polishing, proving
 from maneuver_automaton.planning.checking import load_checks
-from maneuver_automaton.planning.from_state import between_trims
-from maneuver_automaton.planning.leaving import plan_leaving
-from maneuver_automaton.planning.no_way import with_proof
-from maneuver_automaton.planning.polishing import left_out
-from maneuver_automaton.planning.proving import kept_bounds, known_bound, plan_to_gap
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
 from maneuver_automaton.planning.steps import answer, prepare_steps, uses_lattice
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.beginning import prepare_first_call
+from maneuver_automaton.problem import Problem, between_trims
+from maneuver_automaton.search import beginning, lattice_query
 from maneuver_automaton.search.choose import load_search
-from maneuver_automaton.search.lattice_query import lattice_query
 
 
 def plan(
@@ -84,7 +79,7 @@ def plan(
     """
     if leave:
         search = functools.partial(plan, gap=gap, watch=watch)
-        return plan_leaving(problem, search, time_limit=time_limit)
+        return leaving.plan_leaving(problem, search, time_limit=time_limit)
     workspace = workspace_of(problem.obstacles)
     shows = None
     if on_better is not None:
@@ -105,7 +100,7 @@ def _shown(
     problem: Problem, watch: Watch, on_better: Callable[[PlanResult], None]
 ) -> Callable[[Callable[..., PlanResult]], None]:
     """What hands a better plan on, with the best bound that there is meanwhile."""
-    known = functools.cache(lambda: known_bound(problem))
+    known = functools.cache(lambda: proving.known_bound(problem))
 
     def show(found: Callable[..., PlanResult]) -> None:
         bound = known()
@@ -156,14 +151,16 @@ def plan_in(
             def search(part: Budget) -> PlanResult:
                 return answer(problem, part, workspace, alternatives=alternatives)
 
-            kept = kept_bounds(problem, workspace)
-            result = plan_to_gap(problem, search, budget, watch, kept=kept)
-        return _noted(with_proof(result, budget))
+            kept = proving.kept_bounds(problem, workspace)
+            result = proving.plan_to_gap(problem, search, budget, watch, kept=kept)
+        return _noted(result if result.plan else no_way.with_proof(result, budget))
 
 
 def _noted(result: PlanResult) -> PlanResult:
     """The result, with what was left out of planning."""
-    notes = left_out(result.problem)
+    if not result.problem.automaton.model.reduced_names:
+        return result  # there is nothing to polish
+    notes = polishing.left_out(result.problem)
     return replace(result, notes=(*result.notes, *notes)) if notes else result
 
 
@@ -174,8 +171,8 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     problem = between_trims(problem)
     if uses_lattice(problem):
         goals = tuple(range(len(problem.goals)))
-        lattice_query(problem, goals, prepared=workspace.prepared)
-        prepare_first_call(problem, workspace.prepared)
+        lattice_query.lattice_query(problem, goals, prepared=workspace.prepared)
+        beginning.prepare_first_call(problem, workspace.prepared)
         load_checks(problem, workspace)
 
 
@@ -188,7 +185,7 @@ def load(problem: Problem, workspace: Workspace) -> None:
     if problem.has_states:
         return  # each question between trims has a search of its own
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
-        prepare_first_call(problem, workspace.prepared)
+        beginning.prepare_first_call(problem, workspace.prepared)
 
 
 def plans(

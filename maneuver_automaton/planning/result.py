@@ -8,16 +8,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
+from maneuver_automaton import bounds
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
 from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.audit import Audit, Surroundings, TerminalError, surroundings_around
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.bounds.separation import Narrowest
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import AnyObstacle, Shape
-from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision import AnyObstacle, Shape, fcl_checker
 from maneuver_automaton.planning.on_the_way import Passed, passed_on_the_way
 from maneuver_automaton.problem import Problem
 
@@ -41,7 +40,7 @@ class Workspace:
 
     obstacles: tuple[AnyObstacle, ...]
     prepared: Prepared = field(default_factory=Prepared)  # libraries, worlds, and tables
-    _checkers: dict[tuple[tuple[Shape, ...], _Map, float, float], FclChecker] = field(
+    _checkers: dict[tuple[tuple[Shape, ...], _Map, float, float], fcl_checker.FclChecker] = field(
         default_factory=dict, init=False
     )
     _surroundings: dict[_Map, Surroundings] = field(default_factory=dict, init=False)
@@ -60,14 +59,14 @@ class Workspace:
         origin: tuple[float, float],
         *,
         proven: float,
-    ) -> FclChecker:
+    ) -> fcl_checker.FclChecker:
         """FCL's view of some obstacles of the map, counted from an origin [m].
 
         What it reports as hit comes closer than ``margin + proven`` [m].
         """
         key = (footprint, (obstacles, origin), margin, proven)
         if key not in self._checkers:
-            self._checkers[key] = FclChecker(
+            self._checkers[key] = fcl_checker.FclChecker(
                 footprint, obstacles, margin=margin, origin=origin, proven=proven
             )
         return self._checkers[key]
@@ -157,7 +156,7 @@ class PlanResult(Played):
     timing_s: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     improvements: tuple[tuple[float, float], ...] = ()  # seconds since the start, cost
-    narrowest: Narrowest | None = None  # the passage that is too narrow, of a proof
+    narrowest: bounds.Narrowest | None = None  # the passage that is too narrow, of a proof
     reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
     notes: tuple[str, ...] = ()  # what was left out or done otherwise, and why: a sentence each

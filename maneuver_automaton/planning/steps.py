@@ -15,15 +15,23 @@ import numpy as np
 
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton.automaton import validation
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
-from maneuver_automaton.automaton.validation import trims_between
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models.speeds import steers_at_rest
-from maneuver_automaton.planning.along_paths import AlongPaths
-from maneuver_automaton.planning.along_poses import AlongPoses
-from maneuver_automaton.planning.among_zones import AmongZones
+from maneuver_automaton.planning import (
+    along_paths,
+    along_poses,
+    among_zones,
+    bounds,
+    from_state,
+    lattice_words,
+    on_state_lattice,
+    polished_price,
+    polishing,
+    within_tolerance,
+)
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
-from maneuver_automaton.planning.bounds import bound_along_paths, least_price_per_metre
 from maneuver_automaton.planning.checking import load_checking, load_checks
 from maneuver_automaton.planning.free_space import (
     AllWords,
@@ -32,20 +40,13 @@ from maneuver_automaton.planning.free_space import (
     TurnedByManeuvers,
     certificate_of,
 )
-from maneuver_automaton.planning.from_state import FromState, between_trims
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
-from maneuver_automaton.planning.lattice_words import LatticeWords
-from maneuver_automaton.planning.on_state_lattice import OnStateLattice
-from maneuver_automaton.planning.polished_price import prices_metres_alone
-from maneuver_automaton.planning.polishing import Polish, why_not_polished
 from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
-from maneuver_automaton.planning.within_tolerance import WithinTolerance
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.refinement.stop_and_steer import follows_paths
-from maneuver_automaton.search.beginning import begin, end
+from maneuver_automaton.problem import Problem, between_trims
+from maneuver_automaton.refinement import relaxed_end, stop_and_steer
+from maneuver_automaton.search import beginning
 from maneuver_automaton.search.limits import why_impossible
-from maneuver_automaton.words.maneuver_words import only_maneuvers_turn
+from maneuver_automaton.words import maneuver_words
 
 SAVING = 1e-3  # share of a cost that better times have to save for others to be looked for
 
@@ -83,7 +84,7 @@ def answer(
                 step.offer(found)
     finally:
         if ended.begun is not None:  # whose memory serves the next query
-            end(problem, ended.begun, workspace.prepared)
+            beginning.end(problem, ended.begun, workspace.prepared)
     if ended.verdict is not None:
         return ended.verdict
     if not ended.is_complete:
@@ -93,7 +94,7 @@ def answer(
     if not found.plans:
         return found.none(*(ended.why or _why_none(found)), nodes=ended.nodes)
     return found.found(
-        bound=ended.bound or bound_along_paths(problem),
+        bound=ended.bound or bounds.bound_along_paths(problem),
         searched=ended.searched,
         certificate=certificate_of(found) if certified else None,
         nodes=ended.nodes,
@@ -103,7 +104,7 @@ def answer(
 def steps_of(problem: Problem) -> Steps:
     """The steps of a problem: along the poses on its way, or those of a leg to its goals."""
     if problem.via:
-        return Steps([AlongPoses(functools.partial(answer, course=leg_steps))])
+        return Steps([along_poses.AlongPoses(functools.partial(answer, course=leg_steps))])
     return leg_steps(problem)
 
 
@@ -113,12 +114,12 @@ def leg_steps(problem: Problem) -> Steps:
     Where it starts or ends in a state of no trim, problems between trims are answered instead.
     """
     if problem.has_states:
-        return Steps(
-            [FromState(functools.partial(answer, course=leg_steps), prepare_steps)], POLISHED
-        )
-    graph = [OnStateLattice()] if _may_be_a_graph(problem) else []
+        legs = functools.partial(answer, course=leg_steps)
+        return Steps([from_state.FromState(legs, prepare_steps)], POLISHED)
+    graph = [on_state_lattice.OnStateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
-        return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
+        exact = functools.partial(answer, course=exact_steps)
+        return Steps([*graph, within_tolerance.WithinTolerance(exact)])
     rest = exact_steps(problem)
     return rest._replace(steps=[*graph, *rest.steps])
 
@@ -126,7 +127,7 @@ def leg_steps(problem: Problem) -> Steps:
 def exact_steps(problem: Problem) -> Steps:
     """The steps to plans that end exactly at a goal: of the search, or of several among zones."""
     if problem.zones:
-        zones = AmongZones(functools.partial(answer, course=search_steps))
+        zones = among_zones.AmongZones(functools.partial(answer, course=search_steps))
         return Steps([FreeEnds(), NearlyMet(), zones])
     rest = search_steps(problem)
     return rest._replace(steps=[FreeEnds(), *rest.steps])
@@ -146,26 +147,27 @@ def search_steps(problem: Problem) -> Steps:
             return Steps([NearlyMet(), AllWords(), BestTimes()], certified=invariant)
         climbs = problem.start.size > 3
         first: list[PlanningStep] = [Checks(), FreeWords()] if climbs else []
-        lattice = [LatticeWords()] if method in ("auto", "lattice") else []
+        lattice = [lattice_words.LatticeWords()] if method in ("auto", "lattice") else []
         return Steps([NearlyMet(), *first, *lattice, BestTimes()], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
-    stops = follows_paths(automaton.model) and steers_at_rest(automaton.model)
+    stops = stop_and_steer.follows_paths(automaton.model) and steers_at_rest(automaton.model)
     along = searched and stops and problem.rests_at_both_ends
-    shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
-    polish = None if shortest or why_not_polished(problem) else Polish()
+    # To stop and steer costs no metre.
+    shortest = along and polished_price.prices_metres_alone(problem.cost)
+    polish = None if shortest or polishing.why_not_polished(problem) else polishing.Polish()
     steps: list[PlanningStep] = [NearlyMet(), Checks()]
     if along:
-        steps.append(AlongPaths(polish))
+        steps.append(along_paths.AlongPaths(polish))
     rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
     alone_in_time = problem.horizon.time is not None and not rests  # words alone meet the time
     first_words = method == "auto" and (not problem.obstacles or alone_in_time)
     if linked and (first_words or not searched):
         steps.append(LinkedWords())
     on_nodes = automaton.lattice is not None and not automaton.body_velocities.any() and searched
-    if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
+    if maneuver_words.only_maneuvers_turn(automaton) and not on_nodes:  # there it is by chance
         steps.append(TurnedByManeuvers())
     if linked and searched:
-        steps.append(LatticeWords(polish))
+        steps.append(lattice_words.LatticeWords(polish))
     if polish:
         steps.append(polish)
     steps.append(BestTimes())
@@ -177,9 +179,9 @@ def prepare_steps(problem: Problem, workspace: Workspace) -> None:
     if problem.obstacles or problem.zones:
         load_checking()  # what is imported in the first check would make it late
     if problem.has_states:
-        FromState(answer, prepare_steps).prepare(problem, workspace)
+        from_state.FromState(answer, prepare_steps).prepare(problem, workspace)
         return
-    if _may_be_a_graph(problem) and OnStateLattice().prepare(problem, workspace):
+    if _may_be_a_graph(problem) and on_state_lattice.OnStateLattice().prepare(problem, workspace):
         return
     for step in search_steps(problem).steps:
         step.prepare(problem, workspace)
@@ -227,7 +229,8 @@ class FreeEnds(PlanningStep):
     def offer(self, found: Incumbents) -> None:
         """Offer nothing, but a verdict."""
         problem, ended = found.problem, found.ended
-        ended.begun = begin(problem, found.workspace.prepared, found.budget)
+        if uses_lattice(problem):
+            ended.begun = beginning.begin(problem, found.workspace.prepared, found.budget)
         if ended.begun is None:
             ended.verdict = blocked_ends(problem) or goals_off_lattice(problem)
             ended.is_complete = ended.verdict is not None
@@ -259,7 +262,8 @@ class BestTimes(PlanningStep):
         while found.cost < before * (1.0 - SAVING) and found.may_check:
             before, best = found.cost, found.plans[0]
             goal = found.problem.goals[best.goal_index]
-            better = with_relaxed_end(found.problem, best.plan, goal, budget=found.for_better)
+            within, problem = found.for_better, found.problem
+            better = relaxed_end.with_relaxed_end(problem, best.plan, goal, budget=within)
             if better is not None and found.may_check:
                 found.offer(better, best.goal_index, proven=False)
 
@@ -272,7 +276,7 @@ class Checks(PlanningStep):
         load_checking()
         if problem.automaton.maneuvers:
             load_kernels("times")
-            least_price_per_metre(problem.automaton, problem.cost)
+            bounds.least_price_per_metre(problem.automaton, problem.cost)
 
     def is_due(self, found: Incumbents) -> bool:
         """Whether there is time."""
@@ -312,7 +316,8 @@ def _why_unlinked(problem: Problem) -> str:
         return ""
     start, lasts = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
     index = automaton.index_of
-    between = trims_between(automaton, index(start.name), [index(one.name) for one in lasts])
+    ends = [index(one.name) for one in lasts]
+    between = validation.trims_between(automaton, index(start.name), ends)
     if not between.size:
         named = " or ".join(dict.fromkeys(repr(one.name) for one in lasts))
         return f"no maneuvers of the library lead from trim {start.name!r} to {named}"

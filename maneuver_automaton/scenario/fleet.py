@@ -225,12 +225,6 @@ class FleetScenario:
         return found
 
 
-def states_several(document: Document) -> bool:
-    """Whether a scenario file is one of several vehicles."""
-    value = document.value
-    return isinstance(value, dict) and not {"vehicles", "fleet"}.isdisjoint(value)
-
-
 def fleet_of_document(
     document: Document, *, path: Path | None, begin: float, own: Model | None = None
 ) -> FleetScenario:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from maneuver_automaton import roads
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
@@ -21,15 +22,13 @@ from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.models import Model, SecondOrderCar
-from maneuver_automaton.roads import RoadScene, RoadVehicle
-from maneuver_automaton.scenario.fleet import (
-    FleetScenario,
-    fleet_of_document,
-    fleet_of_statement,
+from maneuver_automaton.scenario import fleet
+from maneuver_automaton.scenario.scenario import (
+    Scenario,
+    combined,
+    scenario_of_document,
     states_several,
-    without_fleet,
 )
-from maneuver_automaton.scenario.scenario import Scenario, combined, scenario_of_document
 
 MANY_TURNS = 2.0 * math.pi + 0.01  # [rad] a full turn, however it was rounded
 
@@ -39,8 +38,8 @@ class RoadScenario:
     """A drive on roads that a file states, and who drives."""
 
     name: str
-    scene: RoadScene
-    vehicle: RoadVehicle
+    scene: roads.RoadScene
+    vehicle: roads.RoadVehicle
 
     __repr__ = brief
 
@@ -51,7 +50,7 @@ def load_scenario(
     beside: Path | str | None = None,
     case: int | None = None,
     model: Model | None = None,
-) -> Scenario | FleetScenario | RoadScenario:
+) -> Scenario | fleet.FleetScenario | RoadScenario:
     """The problem of a file: a scenario, or another format that states one or a part of one.
 
     A CommonRoad file states a drive on roads: `plan_road` and `drive_road` take its scene and its
@@ -92,12 +91,12 @@ def load_scenario(
             if isinstance(document.value, dict) and "schema" in document.value:
                 _refuse_parts(path, beside, case)
             if states_several(document):
-                return fleet_of_document(document, path=path, begin=begin, own=model)
+                return fleet.fleet_of_document(document, path=path, begin=begin, own=model)
             return scenario_of_document(document, path=path, begin=begin, own=model)
         statements = found
     statement = _chosen(path, statements, case)
     if statement.road is not None:
-        vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
+        vehicle = roads.RoadVehicle() if beside is None else _road_vehicle(Path(beside))
         return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
     rest, settings, loop = None, None, None
     if beside is not None:
@@ -105,15 +104,16 @@ def load_scenario(
         document = _beside(Path(beside), start=stated.start, goal=stated.goal)
         with _errors_of_with():
             if statement.fleet:
-                document, settings, loop = without_fleet(document)
+                document, settings, loop = fleet.without_fleet(document)
             rest = scenario_of_document(document, path=Path(beside), begin=begin, own=model)
     elif model is not None:
         raise InvalidScenario(
             f"{path}: names no vehicle of yours; need --with and a scenario that does"
         )
-    scenario: Scenario | FleetScenario
+    scenario: Scenario | fleet.FleetScenario
     if statement.fleet:
-        scenario = fleet_of_statement(statement, rest, path=path, settings=settings, loop=loop)
+        how: dict[str, Any] = {"settings": settings, "loop": loop}
+        scenario = fleet.fleet_of_statement(statement, rest, path=path, **how)
     else:
         scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
@@ -133,7 +133,7 @@ def load_roads(path: Path | str, *, beside: Path | str | None = None) -> tuple[R
     """
     from maneuver_automaton.formats.commonroad import read_commonroad
 
-    vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
+    vehicle = roads.RoadVehicle() if beside is None else _road_vehicle(Path(beside))
     return tuple(
         RoadScenario(name=one.name, scene=one.road, vehicle=vehicle)
         for one in read_commonroad(Path(path))
@@ -141,7 +141,7 @@ def load_roads(path: Path | str, *, beside: Path | str | None = None) -> tuple[R
     )
 
 
-def _road_vehicle(beside: Path) -> RoadVehicle:
+def _road_vehicle(beside: Path) -> roads.RoadVehicle:
     """The vehicle of a scenario beside a drive on roads."""
     anywhere, begin = np.zeros(3), time.perf_counter()  # the scene states its own
     document = _beside(beside, start=anywhere, goal=anywhere)
@@ -159,7 +159,7 @@ def _road_vehicle(beside: Path) -> RoadVehicle:
         )
     length, width = body.size.tolist()
     ahead = float(body.center[0])
-    return RoadVehicle(model=model, length=length, width=width, ahead=ahead)
+    return roads.RoadVehicle(model=model, length=length, width=width, ahead=ahead)
 
 
 def statements_of(path: Path) -> tuple[Statement, ...] | None:

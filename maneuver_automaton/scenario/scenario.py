@@ -31,7 +31,7 @@ from maneuver_automaton.problem import (
     Via,
     settled_state,
 )
-from maneuver_automaton.receding_horizon.simulation import Disturbance
+from maneuver_automaton.receding_horizon import simulation
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
@@ -341,10 +341,17 @@ def cost_of(
     return cost
 
 
-def disturbance_of(part: NoisePart, *, seed: int | None = None) -> Disturbance:
+def states_several(document: Document) -> bool:
+    """Whether a scenario file is one of several vehicles."""
+    value = document.value
+    return isinstance(value, dict) and not {"vehicles", "fleet"}.isdisjoint(value)
+
+
+def disturbance_of(part: NoisePart, *, seed: int | None = None) -> simulation.Disturbance:
     """What a file says of disturbances, with another seed if one is given."""
-    pushes = {push.after_step: push.by for push in part.pushes}
-    return made(Disturbance, part, pushes=pushes, **({} if seed is None else {"seed": seed}))
+    known: dict[str, Any] = {} if seed is None else {"seed": seed}
+    known["pushes"] = {push.after_step: push.by for push in part.pushes}
+    return made(simulation.Disturbance, part, **known)
 
 
 def _horizon(document: Document, file: ScenarioFile) -> Horizon:

@@ -24,7 +24,7 @@ from maneuver_automaton.collision import (
 )
 from maneuver_automaton.collision.motion import STANDS
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.nav2_map import load_nav2_map, load_nav2_mask, read_grey_image
+from maneuver_automaton.formats import nav2_map
 from maneuver_automaton.formats.statement import MapFile, simple_polygon
 from maneuver_automaton.formats.yaml_source import Document, Where
 from maneuver_automaton.places import Clearance, Ground, PlaceCost
@@ -62,7 +62,7 @@ def obstacles_of(
         if part.map is not None:
             path = folder / part.map
             with at(document, (*where, "map"), files=True):
-                cells = load_nav2_map(path, unknown=part.unknown)
+                cells = nav2_map.load_nav2_map(path, unknown=part.unknown)
             maps.append(MapFile(map=cells, path=path, unknown=part.unknown))
             obstacles.append(cells)
             continue
@@ -128,7 +128,7 @@ def _zones_of_mask(
     if limit is None:
         raise document.error(("zones", k), "map: needs speed_limit: {base, multiplier, unit}")
     with at(document, ("zones", k, "map"), files=True):
-        mask = load_nav2_mask(path)
+        mask = nav2_map.load_nav2_mask(path)
     if unknown := int((mask.values < 0).sum()):
         raise document.error(
             ("zones", k, "map"), f"{path}: {unknown} cells are unknown, need a value in every cell"
@@ -285,7 +285,7 @@ def _of_file(document: Document, part: GroundPart, where: Where, folder: Path) -
 def _values(path: Path, *, shades: float) -> Array:
     """Numbers of an array of NumPy as it is, or an image's shades from 0 to `shades`, turned up."""
     if path.suffix != ".npy":
-        return np.asarray(read_grey_image(path).shade[::-1] * shades)
+        return np.asarray(nav2_map.read_grey_image(path).shade[::-1] * shades)
     try:
         return np.asarray(np.load(path, allow_pickle=False))  # whose numbers the ground checks
     except (OSError, ValueError, TypeError, EOFError) as error:

@@ -24,9 +24,8 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.free_insertion import free_stages
+from maneuver_automaton.search import free_insertion, linked_insertion
 from maneuver_automaton.search.limits import sole_shortest, three_are_enough
-from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
 from maneuver_automaton.search.word_scan import MOST_TRIMS, tables
@@ -312,6 +311,6 @@ def insertion_stages(task: InsertionTask) -> Iterator[SearchResult]:
     most = task.alternatives + 1
     # a trim that has to last a while cannot be priced for an instant
     instants = task.problem.automaton.is_kinematic and task.problem.horizon.min_coast == 0.0
-    for stage in (free_stages if instants else linked_stages)(task):
+    for stage in (free_insertion.free_stages if instants else linked_insertion.linked_stages)(task):
         kept = tuple(one for one in stage.solutions if one.cost < task.upper_bound)[:most]
         yield replace(stage, solutions=kept, status=SearchStatus.FOUND if kept else stage.status)

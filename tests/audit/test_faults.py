@@ -98,14 +98,14 @@ def test_a_trailer_that_the_planner_places_beside_its_place(monkeypatch):
         parts={"trailer": (Disc(0.5),)},
         obstacles=[post],
     )
-    right = checking.carried
+    right = checking.cutting.carried
     assert check_plan(problem, plan, problem.goals[0]).broken is Condition.COLLISION
 
     def beside(*arguments):
         there = right(*arguments)
         return replace(there, start=np.add(there.start, [0.0, 50.0, 0.0]))
 
-    monkeypatch.setattr(checking, "carried", beside)
+    monkeypatch.setattr(checking.cutting, "carried", beside)
     found = check_plan(problem, plan, problem.goals[0])
     assert found.broken is Condition.AUDIT
     assert found.reason.startswith("the trailer: at ")

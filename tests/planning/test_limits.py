@@ -83,7 +83,7 @@ def test_prices_of_maneuvers_are_known_before_the_clock_starts(
 ) -> None:
     """The bound of a plan needs them, 25 ms for a helicopter."""
     priced: list[str] = []
-    monkeypatch.setattr(steps, "least_price_per_metre", lambda *_: priced.append(method))
+    monkeypatch.setattr(steps.bounds, "least_price_per_metre", lambda *_: priced.append(method))
     linked = unicycle_automaton()
     prepare(Problem(linked, [0, 0, 0], [2, 1, 0], search=SearchSettings(method=method)))
     assert priced == [method]
