@@ -18,7 +18,6 @@ from __future__ import annotations
 import argparse
 import csv
 import functools
-import itertools
 import math
 import sys
 import time
@@ -44,7 +43,7 @@ from maneuver_automaton.scenario import load_scenario
 
 DATA = cases.DATA / "fleet"
 STEP = 0.005  # [s] between two looks at the bodies
-BLOCK = 2000  # looks at once
+BLOCK = 400  # looks at once
 
 
 def files(words: list[str]) -> list[Path]:
@@ -64,42 +63,44 @@ def published() -> dict[str, float]:
     return best
 
 
-def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[list[tuple[ShapePart, Plan]]]:
-    """Parts of every vehicle with the plans of their frames."""
+def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[tuple[str, ShapePart, Plan]]:
+    """Parts of every vehicle with its name and the plans of their frames."""
     for name, problem in zip(fleet.names, fleet.problems, strict=True):
         plan = result.plans.get(name)
         if plan is None:
             continue
-        parts = [(part, plan) for part in parts_of(problem.footprint)]
+        yield from ((name, part, plan) for part in parts_of(problem.footprint))
         for carried_name, shapes in problem.parts.items():
             behind = carried(plan, problem.automaton.model, carried_name)
-            parts += [(part, behind) for part in parts_of(shapes)]
-        yield parts
+            yield from ((name, part, behind) for part in parts_of(shapes))
 
 
 def least_distance(fleet: FleetProblem, result: FleetResult) -> float:
     """Least distance [m] of any two bodies at short steps until all have arrived."""
     every = list(bodies(fleet, result))
+    at_zero = [part.at(np.zeros((1, 3))) for _, part, _ in every]
+    reach = np.array([np.hypot(*shapely.get_coordinates(core).T).max() for core in at_zero])
+    reach += [part.radius for _, part, _ in every]
+    owner = np.unique([name for name, *_ in every], return_inverse=True)[1]
     times = np.arange(0.0, result.last_s + 1.0, STEP)
     least = math.inf
+    ways = [
+        plan.pose_at(np.clip(times, plan.start_time, plan.start_time + plan.duration))[:, :3]
+        for _, _, plan in every
+    ]
     for begin in range(0, len(times), BLOCK):
-        now = times[begin : begin + BLOCK]
-        placed = []
-        for parts in every:
-            rows = []
-            for part, plan in parts:
-                clock = np.clip(now, plan.start_time, plan.start_time + plan.duration)
-                poses = plan.pose_at(clock)[:, :3]
-                core = part.at(poses)
-                rows.append((core, part.radius, shapely.bounds(core)))
-            placed.append(rows)
-        for one, other in itertools.combinations(placed, 2):
-            for (a, r_a, box_a), (b, r_b, box_b) in itertools.product(one, other):
-                gap = np.maximum(box_a[:, :2] - box_b[:, 2:], box_b[:, :2] - box_a[:, 2:])
-                near = np.flatnonzero(gap.max(axis=1) - r_a - r_b <= min(least, 5.0))
-                if near.size:
-                    apart = shapely.distance(a[near], b[near]) - r_a - r_b
-                    least = min(least, float(apart.min()))
+        now = [way[begin : begin + BLOCK] for way in ways]
+        places = np.array(now).reshape(len(now), -1, 3)[..., :2]
+        low, high = places.min(axis=1), places.max(axis=1)
+        gaps = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=-1)
+        apart = (gaps - reach - reach[:, None] <= least) & (owner[:, None] < owner)
+        for one, other in zip(*np.nonzero(apart), strict=True):
+            far = np.hypot(*(places[one] - places[other]).T) - reach[one] - reach[other]
+            near = np.flatnonzero(far <= least)
+            if near.size:
+                parts = [(every[k][1], now[k][near]) for k in (one, other)]
+                found = shapely.distance(*(part.at(poses) for part, poses in parts))
+                least = min(least, float(found.min()) - sum(part.radius for part, _ in parts))
     return least
 
 
