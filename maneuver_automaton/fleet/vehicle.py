@@ -350,7 +350,9 @@ class FleetMember:
             found = self._found(self._planned(problem, budget, improve=again, most=most))
             return found if found is not None and found.cost < known else None
         own, aims = self.aimed, self.aims
-        query = self._query(replace(problem, goals=own.goals))
+        query = self._query(
+            replace(problem, goals=own.goals) if own is not self.problem else problem
+        )
         best: Word | None = None
         for way in (*self.ways, *filter(None, [self.aside])):
             if way.cost >= (best.cost if best else known) or budget.is_over:
@@ -364,7 +366,7 @@ class FleetMember:
             if not aims:
                 return None
             goals = tuple(goal for _, goal in aims)
-            past = replace(past, goals=goals)
+            past = past if goals == past.goals else replace(past, goals=goals)
             if goals != own.goals:
                 own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
             # round those that stay at their goals, wherever they are now, with rests

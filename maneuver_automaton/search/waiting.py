@@ -42,9 +42,11 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
         return None
     if not len(word.trims):
         return with_cost(word, query)
-    parts = _with_rests(path, state, rest)
+    ways = [_with_rests(path, state, rest)]
+    if library.library.switch > 0.0:
+        ways.append(_with_fewer_rests(query, ways[0], rest))
     words = []
-    for one in (parts, _with_fewer_rests(query, parts, rest)):
+    for one in ways:
         driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in one]
         words.append(with_cost(query.word_of(driven, word.goal), query))
     return min(words, key=lambda timed: timed.cost)
