@@ -357,7 +357,7 @@ class FleetMember:
         for way in (*self.ways, *filter(None, [self.aside])):
             if way.cost >= (best.cost if best else known) or budget.is_over:
                 break
-            timed = with_waits(query, way)
+            timed = with_waits(query, way, hurried=schedule is None)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
         if best is None:
@@ -372,7 +372,7 @@ class FleetMember:
             # round those that stay at their goals, wherever they are now, with rests
             if blocked_ends(past) is None:
                 word = self._first(self._query(past), budget, QUICK).word
-                best = None if word is None else with_waits(query, word)
+                best = word and with_waits(query, word, hurried=schedule is None)
         if best is None or (schedule is not None and best.cost > NEARLY * self.ways[0].cost):
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):
