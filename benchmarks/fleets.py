@@ -6,11 +6,12 @@ plan, the sum of their arrivals alone and together, when the last arrives, proce
 first feasible fleet and in all, the least distance of two bodies by shapely at 5 ms, and the least
 published sum (as reported, or of arrivals on the planner's clock).
 
-``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu]``: the share
+``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu] [--rounds R]``: the share
 that is solved within limits of time, and the medians of what solved ones cost over the sum alone,
 for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of each kind are
 drawn there first. Who is solved within one limit counts as solved within the longer ones. --cpu
-counts processor time, which other programs on the machine disturb less.
+counts processor time, which other programs on the machine disturb less; --rounds 0 ends with first
+plans.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import functools
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -104,7 +105,7 @@ def least_distance(fleet: FleetProblem, result: FleetResult) -> float:
     return least
 
 
-def solved_shares(folder: Path, limits: list[float], *, seed: int, jobs: int) -> None:
+def solved_shares(folder: Path, limits: list[float], plan: Callable[..., FleetResult]) -> None:
     """A table of the kinds of instances below a folder, and of limits of time [s]."""
     rows, warm = [], False
     for kind in sorted({path.parent for path in folder.rglob("*.yaml")}):
@@ -115,9 +116,9 @@ def solved_shares(folder: Path, limits: list[float], *, seed: int, jobs: int) ->
             for path in paths:
                 fleet = load_scenario(path).fleet
                 if not warm:
-                    plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                    plan(fleet, time_limit=limit)
                     warm = True
-                result = plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                result = plan(fleet, time_limit=limit)
                 least = min(least, least_distance(fleet, result))
                 if len(result.plans) < len(fleet):
                     unsolved.append(path)
@@ -139,6 +140,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--rounds", type=int)
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--limits", default="1,5,20")
     parser.add_argument("--draw", type=int, default=0)
@@ -151,7 +153,8 @@ def main() -> None:
         if given.draw:
             draw(given.folder, given.draw, given.seed)
         limits = [float(one) for one in given.limits.split(",")]
-        solved_shares(given.folder, limits, seed=given.seed, jobs=given.jobs)
+        settings = {"seed": given.seed, "jobs": given.jobs, "max_rounds": given.rounds}
+        solved_shares(given.folder, limits, functools.partial(plan_fleet, **settings))
         return
     if not cases.present("fleet"):
         return
