@@ -6,12 +6,12 @@ plan, the sum of their arrivals alone and together, when the last arrives, proce
 first feasible fleet and in all, the least distance of two bodies by shapely at 5 ms, and the least
 published sum (as reported, or of arrivals on the planner's clock).
 
-``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu] [--rounds R]``: the share
-that is solved within limits of time, and the medians of what solved ones cost over the sum alone,
-for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of each kind are
-drawn there first. Who is solved within one limit counts as solved within the longer ones. --cpu
-counts processor time, which other programs on the machine disturb less; --rounds 0 ends with first
-plans.
+``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu] [--rounds R]``:
+the share that is solved within limits of time, and the medians of what solved ones cost over the
+sum alone, for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of
+each kind are drawn there first. Who is solved within one limit counts as solved within the longer
+ones. --cpu counts processor time, which other programs on the machine disturb less; --rounds 0 ends
+with first plans.
 """
 
 from __future__ import annotations
