@@ -6,11 +6,12 @@ plan, the sum of their arrivals alone and together, when the last arrives, proce
 first feasible fleet and in all, the least distance of two bodies by shapely at 5 ms, and the least
 published sum (as reported, or of arrivals on the planner's clock).
 
-``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu]``: the share
-that is solved within limits of time, and the medians of what solved ones cost over the sum alone,
-for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of each kind are
-drawn there first. Who is solved within one limit counts as solved within the longer ones. --cpu
-counts processor time, which other programs on the machine disturb less.
+``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu] [--rounds R]``:
+the share that is solved within limits of time, and the medians of what solved ones cost over the
+sum alone, for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of
+each kind are drawn there first. Who is solved within one limit counts as solved within the longer
+ones. --cpu counts processor time, which other programs on the machine disturb less; --rounds 0 ends
+with first plans.
 """
 
 from __future__ import annotations
@@ -18,11 +19,10 @@ from __future__ import annotations
 import argparse
 import csv
 import functools
-import itertools
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,7 +44,7 @@ from maneuver_automaton.scenario import load_scenario
 
 DATA = cases.DATA / "fleet"
 STEP = 0.005  # [s] between two looks at the bodies
-BLOCK = 2000  # looks at once
+BLOCK = 400  # looks at once
 
 
 def files(words: list[str]) -> list[Path]:
@@ -64,46 +64,48 @@ def published() -> dict[str, float]:
     return best
 
 
-def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[list[tuple[ShapePart, Plan]]]:
-    """Parts of every vehicle with the plans of their frames."""
+def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[tuple[str, ShapePart, Plan]]:
+    """Parts of every vehicle with its name and the plans of their frames."""
     for name, problem in zip(fleet.names, fleet.problems, strict=True):
         plan = result.plans.get(name)
         if plan is None:
             continue
-        parts = [(part, plan) for part in parts_of(problem.footprint)]
+        yield from ((name, part, plan) for part in parts_of(problem.footprint))
         for carried_name, shapes in problem.parts.items():
             behind = carried(plan, problem.automaton.model, carried_name)
-            parts += [(part, behind) for part in parts_of(shapes)]
-        yield parts
+            yield from ((name, part, behind) for part in parts_of(shapes))
 
 
 def least_distance(fleet: FleetProblem, result: FleetResult) -> float:
     """Least distance [m] of any two bodies at short steps until all have arrived."""
     every = list(bodies(fleet, result))
+    at_zero = [part.at(np.zeros((1, 3))) for _, part, _ in every]
+    reach = np.array([np.hypot(*shapely.get_coordinates(core).T).max() for core in at_zero])
+    reach += [part.radius for _, part, _ in every]
+    owner = np.unique([name for name, *_ in every], return_inverse=True)[1]
     times = np.arange(0.0, result.last_s + 1.0, STEP)
     least = math.inf
+    ways = [
+        plan.pose_at(np.clip(times, plan.start_time, plan.start_time + plan.duration))[:, :3]
+        for _, _, plan in every
+    ]
     for begin in range(0, len(times), BLOCK):
-        now = times[begin : begin + BLOCK]
-        placed = []
-        for parts in every:
-            rows = []
-            for part, plan in parts:
-                clock = np.clip(now, plan.start_time, plan.start_time + plan.duration)
-                poses = plan.pose_at(clock)[:, :3]
-                core = part.at(poses)
-                rows.append((core, part.radius, shapely.bounds(core)))
-            placed.append(rows)
-        for one, other in itertools.combinations(placed, 2):
-            for (a, r_a, box_a), (b, r_b, box_b) in itertools.product(one, other):
-                gap = np.maximum(box_a[:, :2] - box_b[:, 2:], box_b[:, :2] - box_a[:, 2:])
-                near = np.flatnonzero(gap.max(axis=1) - r_a - r_b <= min(least, 5.0))
-                if near.size:
-                    apart = shapely.distance(a[near], b[near]) - r_a - r_b
-                    least = min(least, float(apart.min()))
+        now = [way[begin : begin + BLOCK] for way in ways]
+        places = np.array(now).reshape(len(now), -1, 3)[..., :2]
+        low, high = places.min(axis=1), places.max(axis=1)
+        gaps = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=-1)
+        apart = (gaps - reach - reach[:, None] <= least) & (owner[:, None] < owner)
+        for one, other in zip(*np.nonzero(apart), strict=True):
+            far = np.hypot(*(places[one] - places[other]).T) - reach[one] - reach[other]
+            near = np.flatnonzero(far <= least)
+            if near.size:
+                parts = [(every[k][1], now[k][near]) for k in (one, other)]
+                found = shapely.distance(*(part.at(poses) for part, poses in parts))
+                least = min(least, float(found.min()) - sum(part.radius for part, _ in parts))
     return least
 
 
-def solved_shares(folder: Path, limits: list[float], *, seed: int, jobs: int) -> None:
+def solved_shares(folder: Path, limits: list[float], plan: Callable[..., FleetResult]) -> None:
     """A table of the kinds of instances below a folder, and of limits of time [s]."""
     rows, warm = [], False
     for kind in sorted({path.parent for path in folder.rglob("*.yaml")}):
@@ -114,9 +116,9 @@ def solved_shares(folder: Path, limits: list[float], *, seed: int, jobs: int) ->
             for path in paths:
                 fleet = load_scenario(path).fleet
                 if not warm:
-                    plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                    plan(fleet, time_limit=limit)
                     warm = True
-                result = plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                result = plan(fleet, time_limit=limit)
                 least = min(least, least_distance(fleet, result))
                 if len(result.plans) < len(fleet):
                     unsolved.append(path)
@@ -138,6 +140,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--rounds", type=int)
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--limits", default="1,5,20")
     parser.add_argument("--draw", type=int, default=0)
@@ -150,7 +153,8 @@ def main() -> None:
         if given.draw:
             draw(given.folder, given.draw, given.seed)
         limits = [float(one) for one in given.limits.split(",")]
-        solved_shares(given.folder, limits, seed=given.seed, jobs=given.jobs)
+        settings = {"seed": given.seed, "jobs": given.jobs, "max_rounds": given.rounds}
+        solved_shares(given.folder, limits, functools.partial(plan_fleet, **settings))
         return
     if not cases.present("fleet"):
         return

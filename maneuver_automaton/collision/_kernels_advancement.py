@@ -34,7 +34,7 @@ def free_time(
         x, y, heading, v_x, v_y, turn_rate, speed, duration, clock = motion
         t = free if duration >= 0.0 else -free
         begun = Coast(x, y, heading, v_x, v_y, turn_rate, speed, t, clock)
-        lasts, nearest = free_of_moving(world.moving, body, begun, keep, margin)
+        lasts, nearest, _ = free_of_moving(world.moving, body, begun, keep, margin)
         clearance = min(clearance, nearest) if lasts == free else nearest
         free = lasts
     return free, clearance

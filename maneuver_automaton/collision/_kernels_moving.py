@@ -152,14 +152,14 @@ def moving_clearance(
 @bare_inner_kernel
 def free_of_moving(
     moving: MovingObstacles, body: Body, motion: Coast, keep: float, margin: float
-) -> tuple[float, float]:
-    """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance."""
+) -> tuple[float, float, int]:
+    """How long it is free of what moves, as `free_time`; last clearance; in whose way, or -1."""
     # Those too far away to be met, by where they may be in the meantime, are passed over: the body
     # never comes as near to them as it would stop at. The others are followed as long as they are
     # there.
     x, y, heading, v_x, v_y, turn_rate, speed, duration, clock = motion
     sign = 1.0 if duration >= 0.0 else -1.0
-    free, nearest = abs(duration), math.inf
+    free, nearest, hit = abs(duration), math.inf, -1
     n, slabs = moving.speed.shape[0], moving.slabs
     during, swept = (0, 0), (0.0, 0.0, 0.0, 0.0)
     if slabs.leaves > 0:
@@ -194,7 +194,7 @@ def free_of_moving(
             clearance = moving_clearance(moving, m, body, pose, time, keep, enough)
             clearance -= keep
             if clearance <= margin:
-                free, nearest = t, clearance
+                free, nearest, hit = t, clearance, m
                 break
             if clearance - shrinks <= margin:
                 closing, lasting = closing_of(moving, m, body, motion, pose[2], time, left)
@@ -208,4 +208,4 @@ def free_of_moving(
             if end == free:
                 nearest = min(nearest, clearance - shrinks)
             break
-    return free, nearest
+    return free, nearest, hit

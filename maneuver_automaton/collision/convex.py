@@ -40,22 +40,24 @@ def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
     return [(piece, 0.0) for piece in _decomposed(shape)]
 
 
-def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[tuple[Array, float]]:
-    """Convex pieces of many shapes seen from a frame (3,), polygons first, then boxes, then discs.
+def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[list[tuple[Array, float]]]:
+    """Convex pieces, seen from a frame (3,), of polygons, those with holes, boxes, and discs.
 
     Places are counted from the frame before they are turned, and rounded before they are cut, so
     that no digit is lost far away and a moved scene comes out the same.
     """
     polygons = [shape for shape in shapes if isinstance(shape, Polygon)]
-    pieces = _plain_pieces([one.corners for one in polygons if not one.holes], frame)
+    plain = _plain_pieces([one.corners for one in polygons if not one.holes], frame)
+    pierced: list[tuple[Array, float]] = []
     for one in polygons:
         if one.holes:
             holes = [seen_from(hole, frame) for hole in one.holes]
-            pieces += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
-    pieces += _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
+            pierced += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
+    boxes = _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
     discs = [shape for shape in shapes if isinstance(shape, Disc)]
     centers = seen_from(np.array([disc.center for disc in discs]).reshape(-1, 1, 2), frame)
-    return pieces + [(one, disc.radius) for one, disc in zip(centers, discs, strict=True)]
+    rounded = [(one, disc.radius) for one, disc in zip(centers, discs, strict=True)]
+    return [plain, pierced, boxes, rounded]
 
 
 def seen_from(points: Array, frame: Array) -> Array:

@@ -7,9 +7,10 @@ world to the last bit (coordinates are rounded to 1e-9 m, far below every proven
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,15 +54,20 @@ SHARE = 10.0**DIGITS  # of a metre or radian that a coordinate is rounded to
 HALF_TURN = float(np.round(np.pi, DIGITS))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class World:
     """Obstacles around one body, seen from `frame`."""
 
     frame: Array  # (3,) pose of the world's own frame in the coordinates of the problem
     body: Body
     arrays: WorldArrays
-    box: Array  # (4,) [low x, low y, high x, high y] of static obstacles, and where moving ones go
+    followed: tuple[_Moving, ...]  # what moves
     last_event: float  # [s] after it no obstacle moves
+
+    @functools.cached_property
+    def box(self) -> Array:
+        """(4,) [low x, low y, high x, high y] of static obstacles, and where moving ones go."""
+        return _box(self.arrays.solids.plates[:, :4], self.followed, self.frame)
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
@@ -123,7 +129,7 @@ def world_of(
     static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     there = present or tuple(one.presence for one in moving)
-    followed = [_moving_of(obstacle) for obstacle in moving]
+    followed = tuple(_moving_of(obstacle) for obstacle in moving)
     where = followed, pose, there, body.reach
     moving_arrays = _moving_obstacles(*where) if followed else NOTHING_MOVES
     times = np.concatenate([moving_arrays.time, moving_arrays.present.ravel()])
@@ -131,7 +137,7 @@ def world_of(
         frame=pose,
         body=body,
         arrays=WorldArrays(solids=solids, buckets=buckets, field=field, moving=moving_arrays),
-        box=_box(solids.plates[:, :4], followed, pose),
+        followed=followed,
         last_event=float(times[np.isfinite(times)].max(initial=-math.inf)),
     )
 
@@ -147,7 +153,13 @@ def _static_arrays(
     body, pose = body_of(footprint), np.array(frame)
     place, turn = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0.0, 0.0, -pose[2]]))
     maps = [one.moved(place).moved(turn) for one in static if isinstance(one, OccupancyMap)]
-    pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)
+    # On from the last ones that were begun anew, if these are the first of all.
+    last = [] if maps else _last_begun(footprint, frame, keep)
+    known = last[0] if last and static[: len(last[0].static)] == last[0].static else NOTHING_BEGUN
+    fresh = static[len(known.static) :]
+    seen = pieces_seen_from([one.shape for one in fresh if isinstance(one, Obstacle)], pose)
+    kinds = [[*old, *new] for old, new in zip(known.kinds, seen, strict=True)]
+    pieces = [*itertools.chain(*kinds)]
     # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
     # by a transform of their cells.
     listed = len(pieces)
@@ -155,8 +167,14 @@ def _static_arrays(
         if isinstance(one, OccupancyMap):
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
-    field = _field(solids, maps, body, keep)
-    _write(field, pieces[:listed], solids, [] if maps else _last_field(footprint, frame, keep))
+    field, begun = _field(solids, maps, body, keep), known.field
+    if begun[1:] == field[1:] and begun.distance.shape == field.distance.shape:
+        field.distance[:] = begun.distance
+        more = [*itertools.chain(*seen)]
+        _kernels_field.write_pieces(field, solids_of(more), len(more))
+    else:
+        _kernels_field.write_pieces(field, solids, listed)
+        last[:] = [_Begun(static, kinds, field)]
     for one in maps:
         x, y, heading = one.origin.tolist()
         there = Place(x, y, math.cos(heading), math.sin(heading))
@@ -210,7 +228,7 @@ def _cells(one: OccupancyMap, frame: Array) -> Array:
     return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
-def _box(boxes: Array, moving: list[_Moving], frame: Array) -> Array:
+def _box(boxes: Array, moving: tuple[_Moving, ...], frame: Array) -> Array:
     low, high = boxes[:, :2], boxes[:, 2:]
     if moving:
         back = SE2(frame).inverse()
@@ -224,31 +242,20 @@ def _box(boxes: Array, moving: list[_Moving], frame: Array) -> Array:
     return np.concatenate([low.min(axis=0), high.max(axis=0)])
 
 
-_Last: TypeAlias = list[tuple[Field, list[tuple[Array, float]]]]
+class _Begun(NamedTuple):
+    """Static obstacles and what was made of them."""
+
+    static: tuple[AnyObstacle, ...]
+    kinds: list[list[tuple[Array, float]]]  # pieces of each kind, as in `pieces_seen_from`
+    field: Field
 
 
 @functools.lru_cache(maxsize=16)
-def _last_field(footprint: tuple[Shape, ...], frame: tuple[float, ...], keep: float) -> _Last:
-    """Where the last field that was begun anew is kept, with its pieces."""
+def _last_begun(
+    footprint: tuple[Shape, ...], frame: tuple[float, ...], keep: float
+) -> list[_Begun]:
+    """Where the last ones that were begun anew are kept."""
     return []
-
-
-def _write(field: Field, pieces: list[tuple[Array, float]], solids: Solids, last: _Last) -> None:
-    """Lower a field to the distances of pieces: on from the last one, if these hold all of its.
-
-    The `solids` begin with them.
-    """
-    begun, known = last[0] if last else (field, [])
-    alike = begun[1:] == field[1:] and begun.distance.shape == field.distance.shape
-    held = {(ring.tobytes(), by) for ring, by in known if alike}
-    keys = [(ring.tobytes(), by) for ring, by in pieces if held]
-    if held and held.issubset(keys):
-        field.distance[:] = begun.distance
-        pieces = [one for one, key in zip(pieces, keys, strict=True) if key not in held]
-        solids = solids_of(pieces)
-    else:
-        last[:] = [(field, pieces)]
-    _kernels_field.write_pieces(field, solids, len(pieces))
 
 
 def _field(solids: Solids, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
@@ -292,7 +299,8 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     return Buckets(start, items, *where)
 
 
-class _Moving(NamedTuple):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Moving:
     """What a moving obstacle is in every world, whatever its frame and whatever is beside it."""
 
     pieces: list[tuple[Array, float]]
@@ -301,11 +309,16 @@ class _Moving(NamedTuple):
     speed: float
     middle: Array
     reach: float
-    way: Array  # (m, 2) places of the middle along its motion
+
+    @functools.cached_property
+    def way(self) -> Array:
+        """Places (m, 2) of the middle along its motion."""
+        times = self.motion.times_for_lines(ALONG)
+        return np.asarray(SE2(self.motion.at(times)).act(self.middle))
 
 
 def _moving_obstacles(
-    every: list[_Moving], frame: Array, present: tuple[tuple[float, float], ...], reach: float
+    every: tuple[_Moving, ...], frame: Array, present: tuple[tuple[float, float], ...], reach: float
 ) -> MovingObstacles:
     """All moving obstacles, for a body of some reach [m]."""
     knots = [one.motion.time.size for one in every]
@@ -350,7 +363,6 @@ def _moving_of(obstacle: Obstacle) -> _Moving:
         speed=motion.fastest(far),
         middle=middle,
         reach=max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own),
-        way=np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle)),
     )
 
 
@@ -381,4 +393,5 @@ def slabs_of(moving: MovingObstacles, reach: float) -> Slabs:
     return Slabs(begin, width, leaves, 0, box)
 
 
-NOTHING_MOVES = _moving_obstacles([], np.zeros(3), (), 0.0)
+NOTHING_BEGUN = _Begun((), [[], [], [], []], Field(np.zeros((0, 0)), 0.0, 0.0, 0.0, 0.0))
+NOTHING_MOVES = _moving_obstacles((), np.zeros(3), (), 0.0)

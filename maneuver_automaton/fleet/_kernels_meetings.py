@@ -36,7 +36,7 @@ def first_meetings(
                 apart = apart_during(slabs, n, m, during, swept) - body.reach - keep
                 if apart > margin:
                     continue
-            free, _ = free_of_moving(one_of(moving, m), body, motion, keep, margin)
+            free, _, _ = free_of_moving(one_of(moving, m), body, motion, keep, margin)
             if free < motion.duration:
                 out[m] = motion.clock + free
 

@@ -350,12 +350,14 @@ class FleetMember:
             found = self._found(self._planned(problem, budget, improve=again, most=most))
             return found if found is not None and found.cost < known else None
         own, aims = self.aimed, self.aims
-        query = self._query(replace(problem, goals=own.goals))
+        query = self._query(
+            replace(problem, goals=own.goals) if own is not self.problem else problem
+        )
         best: Word | None = None
         for way in (*self.ways, *filter(None, [self.aside])):
             if way.cost >= (best.cost if best else known) or budget.is_over:
                 break
-            timed = with_waits(query, way)
+            timed = with_waits(query, way, hurried=schedule is None)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
         if best is None:
@@ -364,13 +366,13 @@ class FleetMember:
             if not aims:
                 return None
             goals = tuple(goal for _, goal in aims)
-            past = replace(past, goals=goals)
+            past = past if goals == past.goals else replace(past, goals=goals)
             if goals != own.goals:
                 own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
             # round those that stay at their goals, wherever they are now, with rests
             if blocked_ends(past) is None:
                 word = self._first(self._query(past), budget, QUICK).word
-                best = None if word is None else with_waits(query, word)
+                best = word and with_waits(query, word, hurried=schedule is None)
         if best is None or (schedule is not None and best.cost > NEARLY * self.ways[0].cost):
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):

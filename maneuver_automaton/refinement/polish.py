@@ -7,6 +7,7 @@ the others only those that come close to the best. Whatever is found is closed: 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -98,7 +99,7 @@ class PolishTask:
     @property
     def scene(self) -> PolishScene:
         """Body, obstacles and bounds seen from the start."""
-        pieces = pieces_seen_from(list(self.obstacles), self.start[:3])
+        pieces = itertools.chain(*pieces_seen_from(list(self.obstacles), self.start[:3]))
         most = lateral_limit(self.model)  # a limit of the vehicle that is none of one state alone
         everywhere = [Guard(lateral=most)] if math.isfinite(most) else []
         return PolishScene(
@@ -113,7 +114,7 @@ class PolishTask:
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
         """A guard with its solids seen from the start."""
         guard, shape = one
-        seen = pieces_seen_from([shape], self.start[:3])
+        seen = itertools.chain(*pieces_seen_from([shape], self.start[:3]))
         return guard._replace(solids=tuple((settled(corners), by) for corners, by in seen))
 
     def _movers_of(self, obstacle: Obstacle) -> Iterator[MovingSolid]:

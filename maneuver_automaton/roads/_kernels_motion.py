@@ -229,7 +229,7 @@ def free_tick(
     lasts, _ = free_of_static(clearing.world, body, motion, off, margin)
     if lasts < duration:  # proven is what lasts for the duration itself
         return False
-    lasts, _ = free_of_moving(clearing.world.moving, body, motion, traffic, margin)
+    lasts, _, _ = free_of_moving(clearing.world.moving, body, motion, traffic, margin)
     return lasts >= duration
 
 
@@ -261,7 +261,7 @@ def stays_free(horizon: RoadArrays, x: float, y: float, heading: float, tick: in
     duration, clock = (last - tick) * clearing.tick, clearing.start + tick * clearing.tick
     moving, body, off = clearing.world.moving, clearing.body, clearing.off_traffic
     stay = Coast(x, y, heading, 0.0, 0.0, 0.0, 0.0, duration, clock)
-    lasts, _ = free_of_moving(moving, body, stay, off, clearing.margin)
+    lasts, _, _ = free_of_moving(moving, body, stay, off, clearing.margin)
     return lasts >= duration
 
 

@@ -10,10 +10,14 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
+from maneuver_automaton.collision._kernels_moving import free_of_moving, moving_clearance
+from maneuver_automaton.collision.arrays import Coast
 from maneuver_automaton.search._kernels_coast import (
     clear_of_static,
     coast_free,
     coast_proven,
+    coasted,
+    is_one_in_plane,
     may_stay,
 )
 from maneuver_automaton.search._kernels_distance import pop, push
@@ -22,6 +26,7 @@ from maneuver_automaton.search.arrays import PathArrays, PathSearch
 HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer
 MOST_ASKED = 20_000  # departures tried in all
+FREE, UNKNOWN = -1, -2  # in whose way a departure is
 USED, QUEUED = range(2)  # places in `path.state`
 JOINT, PARENT = range(2)  # columns of `path.links`
 ARRIVAL, UNTIL, DEPARTURE = range(3)  # columns of `path.times`; the last is that of the parent
@@ -35,8 +40,7 @@ def earliest_arrival(search: PathSearch) -> int:
     is reached, until when the vehicle may stand there, and when it left its parent's joint [s since
     the start].
     """
-    path, lib = search.path, search.library
-    scene, limits = search.scene, search.limits
+    path, lib, scene, limits = search.path, search.library, search.scene, search.limits
     clock, tick, quiet = limits.clock, search.tick, search.quiet
     n, asked = path.trims.shape[0], 0
     path.state[USED] = path.state[QUEUED] = 0
@@ -56,14 +60,16 @@ def earliest_arrival(search: PathSearch) -> int:
             if may_stay(scene, lib, last, pose, clock + arrival, limits.stay_until):
                 return state
             continue
-        trim, t = path.trims[joint], path.durations[joint]
+        t, met = path.durations[joint], (FREE, 0.0)
         # Departures are tried a tick apart; where the way is blocked for long, ever further apart.
         leave, until, step, blocked = arrival, path.times[state, UNTIL], 0.0, 0
         while leave <= until and leave + t <= limits.most_time and asked < MOST_ASKED:
             asked += 1
-            if not coast_free(scene, lib, trim, pose, t, clock + leave):
+            hit = _in_the_way(search, joint, leave, met)
+            if hit[0] != FREE:
                 if leave > quiet:
                     break  # nothing moves any more
+                met = hit
                 step = tick * (1 + blocked // PATIENT)
                 leave, blocked = leave + step, blocked + 1
                 continue
@@ -71,7 +77,7 @@ def earliest_arrival(search: PathSearch) -> int:
                 low, high = leave - step, leave
                 for _ in range(HALVINGS):
                     middle = 0.5 * (low + high)
-                    if coast_free(scene, lib, trim, pose, t, clock + middle):
+                    if _in_the_way(search, joint, middle, met)[0] == FREE:
                         high = middle
                     else:
                         low = middle
@@ -84,6 +90,31 @@ def earliest_arrival(search: PathSearch) -> int:
             # What arrives while it may stand there anyway is of no use.
             leave, blocked = max(leave, stands - t) + tick, 0
     return -1
+
+
+@bare_inner_kernel
+def _in_the_way(
+    search: PathSearch, joint: int, leave: float, last: tuple[int, float]
+) -> tuple[int, float]:
+    """Who is in the way if it leaves a joint at a time [s], and how long after that; or FREE."""
+    # What stands was looked at before. Who was in the way a moment ago, the `last`, most often
+    # still is: one look shows that, where a body is no farther off than no proof lets it be.
+    path, lib, scene = search.path, search.library, search.scene
+    trim, t, pose = path.trims[joint], path.durations[joint], _pose(path, joint)
+    clock = search.limits.clock + leave
+    if search.rest < 0 or not is_one_in_plane(scene, lib):
+        return (FREE if coast_free(scene, lib, trim, pose, t, clock) else UNKNOWN), 0.0
+    moving, body, m = scene.layers.first.moving, lib.parts.body, last[0]
+    for since in (last[1], t, 0.0):
+        if m >= 0 and moving.present[m, 0] <= clock + since <= moving.present[m, 1]:
+            x, y, heading, _ = coasted(lib, trim, pose, since)
+            place, keep = (x, y, heading), scene.keep
+            if moving_clearance(moving, m, body, place, clock + since, keep, keep) <= keep:
+                return m, since
+    twist, fastest = lib.library.twists[trim], lib.parts.fastest[trim]
+    motion = Coast(pose[0], pose[1], pose[2], twist[0], twist[1], twist[2], fastest, t, clock)
+    free, _, hit = free_of_moving(moving, body, motion, scene.keep, scene.margin)
+    return (FREE if free >= t else hit), free
 
 
 @bare_inner_kernel

@@ -156,8 +156,9 @@ def window_of(
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
     """
     pad = pad_around(world, radius)
+    walled = bounds.x is not None and bounds.y is not None
     # Plain numbers: arrays of two take longer than a first plan may.
-    low_x, low_y, high_x, high_y = world.box.tolist()
+    low_x, low_y, high_x, high_y = [0.0] * 4 if walled else world.box.tolist()
     xs, ys = poses[:, 0].tolist(), poses[:, 1].tolist()
     low_x, low_y = min(low_x, *xs) - pad, min(low_y, *ys) - pad
     high_x, high_y = max(high_x, *xs) + pad, max(high_y, *ys) + pad
@@ -179,7 +180,7 @@ def window_of(
     back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
     # What lies on a bound is inside of it, wherever its place is rounded to.
     box = np.concatenate([back.min(axis=0) - slack, back.max(axis=0) + slack])
-    return box, window, bounds.x is not None and bounds.y is not None
+    return box, window, walled
 
 
 def scene_of(

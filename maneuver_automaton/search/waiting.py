@@ -21,11 +21,12 @@ TICK = 0.1  # [s] between departures that are tried
 SHORT_TURN = 0.2  # [rad] of the pieces whose bulge is bounded
 
 
-def with_waits(query: LatticeQuery, word: Word) -> Word | None:
+def with_waits(query: LatticeQuery, word: Word, *, hurried: bool = False) -> Word | None:
     """The word with rests put in so that it is free at the times it is driven; None if none are.
 
-    It arrives as early as rests at the joints of its pieces allow. Without a rest in the library
-    the word is taken as it is, if it is free.
+    It arrives as early as rests at the joints of its pieces allow; `hurried` leaves them there
+    where that costs nothing, else several are put together. Without a rest in the library the word
+    is taken as it is, if it is free.
 
     Source: Phillips, Likhachev (2011), *SIPP: Safe Interval Path Planning for Dynamic
     Environments*, ICRA, here along one path.
@@ -42,9 +43,11 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
         return None
     if not len(word.trims):
         return with_cost(word, query)
-    parts = _with_rests(path, state, rest)
+    ways = [_with_rests(path, state, rest)]
+    if not hurried or library.library.switch > 0.0:
+        ways.append(_with_fewer_rests(query, ways[0], rest))
     words = []
-    for one in (parts, _with_fewer_rests(query, parts, rest)):
+    for one in ways:
         driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in one]
         words.append(with_cost(query.word_of(driven, word.goal), query))
     return min(words, key=lambda timed: timed.cost)

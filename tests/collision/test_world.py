@@ -145,7 +145,7 @@ def test_a_field_that_goes_on_from_the_last_one_is_that_written_at_once(seeds, m
     last = [one for one in others if isinstance(one, Obstacle)][-more:]
     fields = []
     for before in (corners, [*corners, *last]):
-        worlds._last_field.cache_clear()
+        worlds._last_begun.cache_clear()
         worlds._static_arrays.cache_clear()
         for obstacles in (before, [*corners, *last]):
             worlds._static_arrays(tuple(obstacles), BODY, (0.0, 0.0, 0.0), 0.0)
