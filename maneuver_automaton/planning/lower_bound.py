@@ -52,8 +52,8 @@ def lower_bound(
     Returns
     -------
     LowerBound
-        `kind` says what won: ``cells`` is the function above, ``incumbent`` that no plan is left
-        that would be cheaper.
+        `kind` says what won: ``cells`` is the function above, ``shortest`` the shortest path of a
+        car in free space, ``incumbent`` that no plan is left that would be cheaper.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def lower_bound(
     >>> cost = plan(problem).cost
     >>> bound = lower_bound(problem, incumbent=cost, max_work=2_000_000)
     >>> bound.kind, 0.0 <= bound.gap(cost) < 0.05
-    ('cells', True)
+    ('shortest', True)
     """
     time_limit, gap = as_number("time_limit", time_limit), as_number("gap", gap)
     incumbent = as_number("incumbent", incumbent)
