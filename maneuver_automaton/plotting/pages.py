@@ -5,10 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-import struct
 import textwrap
 import warnings
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +17,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import LayoutEngine
+from PIL import Image
 
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.colors import INK
@@ -48,7 +46,6 @@ LOW, HIGH, LEAST_PLANE = 3.6, 5.6, 0.8  # [in] height of the plane
 PANEL, LEAST_PANEL, COLUMN = 1.15, 0.55, 2.15  # [in] heights over time, and the least width
 TICKS, LABEL, EDGE = 0.2, 0.4, 0.12  # [in] of numbers, of numbers and a label, and of the page
 FIRST = 4.0  # [in] height of a page before it is known
-ROW, APART = 0.177, 0.042  # [in] of a legend, and around axes and labels
 
 
 def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
@@ -72,48 +69,6 @@ class Page:
     plane: Any  # Axes, or Axes3D
     panels: tuple[Axes, ...]
     is_stacked: bool  # the panels stand above each other
-
-
-class Snug(LayoutEngine):
-    """Gives axes of one mosaic what numbers and labels, looked at once, leave of a page.
-
-    Matplotlib's own engine looks at them four times, which takes longer than to draw them.
-    """
-
-    _adjust_compatible = _colorbar_gridspec = False
-
-    def __init__(self, top: float, foot: float) -> None:
-        super().__init__()
-        self.ends = ((EDGE, EDGE), (top, foot))  # [in] beside, and above and below all axes
-
-    def execute(self, fig: Any) -> None:
-        """Give the axes and their labels their places."""
-        beyond, labels, cells, edges = [], [], [], []  # [px]
-        apart = APART * fig.dpi
-        for ax in fig.axes:
-            for axis in (ax.xaxis, ax.yaxis):
-                axis.set_label_coords(0.5, 0.5)  # in the axes, until it is known how far outside
-            one, inner = ax.get_subplotspec(), ax.bbox
-            outer = ax.get_tightbbox(for_layout_only=True)
-            high = ax.xaxis.label.get_window_extent().height + apart * bool(ax.get_xlabel())
-            wide = ax.yaxis.label.get_window_extent().width + apart * bool(ax.get_ylabel())
-            across = inner.x0 - outer.x0, outer.x1 - inner.x1
-            beyond.append((across, (outer.y1 - inner.y1, inner.y0 - outer.y0)))
-            labels.append(((wide, 0.0), (0.0, high)))
-            cells.append([(span[0], span[-1]) for span in (one.colspan, one.rowspan)])
-        numbers, grid = np.array(beyond) + apart, one.get_gridspec()
-        for k, ratios in enumerate((grid.get_width_ratios(), grid.get_height_ratios())):
-            begin, end = (fig.dpi * room for room in self.ends[k])
-            place, room = ([one[k] for one in cells], [0, 1]), np.zeros((len(ratios), 2))
-            np.maximum.at(room, place, (numbers + labels)[:, k])
-            sizes = (fig.bbox.size[k] - begin - end - room.sum()) * np.divide(ratios, sum(ratios))
-            ends = begin + np.cumsum(np.insert(room, 1, sizes, axis=1)).reshape(-1, 3)
-            edges.append(ends[place] / fig.bbox.size[k])
-        for ax, (x0, x1), (y0, y1), needed in zip(fig.axes, *edges, numbers, strict=True):
-            ax.set_position((x0, 1.0 - y1, x1 - x0, y1 - y0))
-            ax.apply_aspect()
-            ax.xaxis.set_label_coords(0.5, -needed[1, 1] / ax.bbox.height)
-            ax.yaxis.set_label_coords(-needed[0, 0] / ax.bbox.width, 0.5)
 
 
 def page_of(
@@ -147,7 +102,6 @@ def page_of(
         stacked = sum(panels) * PANEL + (len(panels) - 1) * TICKS
         high = max(min(max(PLANE * wide / shape, LOW), HIGH), stacked)
     _settle(figure, frame + high + below, top)
-    figure.set_layout_engine(Snug(top, foot + 2.0 * APART))
     count = len(panels)
     if flat:
         names: list[Any] = [
@@ -242,7 +196,8 @@ def _legend_below(figure: Figure, entries: Entries) -> float:
         columnspacing=1.6, labelspacing=0.45,
     )  # fmt: skip
     plain(legend, entries)
-    return ROW * rows - 0.05
+    with any_script():
+        return float(legend.get_window_extent().height / figure.dpi)
 
 
 @contextlib.contextmanager
@@ -270,26 +225,12 @@ def write_figure(figure: Figure, path: str | Path) -> None:
     stream = io.BytesIO()
     with any_script(), rc_context(VECTOR):
         if ending == "png":
-            stream.write(_png(figure))
+            # `savefig` lays the figure out once more than this. The level is a fast one: the file
+            # is hardly larger for it.
+            canvas: Any = figure.canvas
+            canvas.draw()
+            pixels = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+            pixels.save(stream, format="png", dpi=(figure.dpi, figure.dpi), compress_level=2)
         else:
             figure.savefig(stream, format=ending, metadata=UNDATED.get(ending))
     write_bytes_atomically(target, stream.getvalue())
-
-
-def _png(figure: Figure) -> bytes:
-    """The figure as a PNG; no row by the one above, which is quicker, and no larger for lines."""
-    canvas: Any = figure.canvas
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    (high, wide), dots = pixels.shape[:2], round(figure.dpi / 0.0254)  # of a meter
-    rows = np.pad(pixels.reshape(high, -1), ((0, 0), (1, 0)))
-    parts = {
-        b"IHDR": struct.pack(">IIBBBBB", wide, high, 8, 2, 0, 0, 0),
-        b"pHYs": struct.pack(">IIB", dots, dots, 1),
-        b"IDAT": zlib.compress(rows.tobytes(), 2),
-        b"IEND": b"",
-    }
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-        for name, data in parts.items()
-    )

@@ -277,10 +277,11 @@ def _figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
     if (ticks := artists.get("nodes")) is not None and ticks.get_array() is not None:
-        above = page.plane.inset_axes((0.5, 1.02, 0.5, 0.02))
-        bar = page.figure.colorbar(ticks, cax=above, location="top")
+        bar = page.figure.colorbar(
+            ticks, ax=page.plane, location="top", shrink=0.5, aspect=30, pad=0.02, anchor=(1, 0)
+        )
         bar.outline.set_visible(False)
-        above.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
+        bar.ax.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
         bar.set_label("cost of expanded nodes", fontsize=SMALL_PT, color=INK)
     return page.figure
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton import _kept
-from maneuver_automaton.collision import Box, Disc, Zone
+from maneuver_automaton.collision import Box, Disc, Zone, fcl_checker
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import Planner, plan, result
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
@@ -71,7 +71,7 @@ def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
         monkeypatch.setattr(module, name, counting)
 
     kinds = (
-        (result, "FclChecker"),
+        (fcl_checker, "FclChecker"),
         (result, "surroundings_around"),
         (lattice_library, "_library"),
         (scene, "_worlds"),
