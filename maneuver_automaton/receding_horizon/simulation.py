@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any, cast
 
 import numpy as np
 
@@ -333,7 +334,8 @@ class _Track:
         if audit and piece.trims:
             self.audits.append(_audited(self.problem, piece))
             same = self.driven[-1] is piece
-            real = self.audits[-1] if same else _audited(self.problem, self.driven[-1])
+            scale = self.upset.twist_scale
+            real = self.audits[-1] if same else _audited(self.problem, self.driven[-1], scale)
             self.log[-1] = _judged(self.problem, now, real)
         self.passed = going_on(self.problem, self.passed, self.driven[-1])
         self.log[-1] = replace(self.log[-1], passed=self.passed)
@@ -422,12 +424,26 @@ def _arrives(step: Step, *, stops: bool) -> bool:
     return left.duration <= NOTHING or not moves_on(left)
 
 
-def _audited(problem: Problem, piece: Plan) -> Audit:
+class _Scaled:
+    """A model whose vehicle moves at other velocities than it says."""
+
+    def __init__(self, model: Model, scale: tuple[float, ...]) -> None:
+        self.model, self.scale = model, np.array(scale)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.model, name)
+
+    def body_velocity(self, reduced_state: Array, control: Array) -> Array:
+        return np.asarray(self.model.body_velocity(reduced_state, control) * self.scale)
+
+
+def _audited(problem: Problem, piece: Plan, scale: tuple[float, ...] | None = None) -> Audit:
     """A piece against the model's equations and the obstacles; it need not end at the goal."""
+    model = problem.automaton.model
     return audit_plan(
         piece,
         Goal(pose=piece.end),
-        problem.automaton.model,
+        cast("Model", _Scaled(model, scale)) if scale else model,
         footprint=problem.footprint,
         parts=problem.parts,
         obstacles=problem.obstacles,

@@ -275,6 +275,19 @@ class TestDisturbances:
         assert len(list(loop.collisions)) == len(list(loop.disturbed)) == hits
         assert len(outcome_of(loop).collisions) == hits
 
+    def test_a_vehicle_that_drives_further_than_it_thinks_is_judged_where_it_is(self):
+        problem = Problem(
+            robot({"rest": (0.0, 0.0), "ahead": (1.0, 0.0), "spin": (0.0, 1.0)}),
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            obstacles=Box([0.2, 0.5], center=[1.6, 0.0]),
+        )
+        upset = Disturbance(twist_scale=(2.0, 1.0, 1.0))
+        (step,) = simulate(problem, step=1.0, steps=1, disturbance=upset).steps
+        assert step.clearance_m == 0.0
+        assert len(step.disturbed) == 1
+        assert not step.violations
+
     def test_a_step_late_the_push_is_seen_a_step_later(self):
         upset = Disturbance(delay=1, pushes={0: (0.1, 0.1, 0.1)})
         loop = simulate(parking_loop(goal=NEAR), step=0.5, disturbance=upset)
