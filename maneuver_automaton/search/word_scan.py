@@ -228,16 +228,12 @@ class WordScan:
         longest = MOST_TRIMS - int(setup.free_heading)
         exact = horizon.time if horizon.time is not None else horizon.max_time
         if horizon.time is None:
-            yield Mode(
-                self._kernel_problem(horizon.max_time, pad=False, fixed=False),
-                min(self.most, longest),
-            )
+            kernel_problem = self._kernel_problem(horizon.max_time, pad=False, fixed=False)
+            yield Mode(kernel_problem, min(self.most, longest))
         elif setup.library.rest is not None:
             # of `max_trims`, rest is one, unless the rest of the time happens to be none
-            yield Mode(
-                self._kernel_problem(horizon.time, pad=True, fixed=False),
-                min(self.most - 1, longest),
-            )
+            kernel_problem = self._kernel_problem(horizon.time, pad=True, fixed=False)
+            yield Mode(kernel_problem, min(self.most - 1, longest))
         if exact is not None:
             most = min(self.most, 2 if self.spare else longest)
             at_least = exact * self.tables.least_rate if len(setup.library.rates) else math.inf
