@@ -103,8 +103,7 @@ def proofs(
         total = int(seen.sum())
         if not any(seen[index] for index in last):
             function = None if function is None else replace(function, least=limit)
-            proof = _proof(cells, limit, total, work)
-            yield replace(proof, optimal=True, function=function)
+            yield replace(_proof(cells, limit, total, work), optimal=True, function=function)
             return
         if total > MOST_CELLS or over():
             return
@@ -117,14 +116,10 @@ def proofs(
                 cells=cells, from_start=zero, to_goal=zero, guess=guess, dual=None, weight=weight
             )
         else:
-            level = _Level(
-                cells=cells,
-                from_start=on_finer(level.cells, cells, level.from_start),
-                to_goal=on_finer(level.cells, cells, level.to_goal),
-                guess=on_finer(level.cells, cells, level.guess),
-                dual=_spread(level, cells),
-                weight=2.0 * level.weight,
-            )
+            known = "from_start", "to_goal", "guess"
+            bounds = {name: on_finer(level.cells, cells, getattr(level, name)) for name in known}
+            dual = _spread(level, cells)
+            level = _Level(cells=cells, dual=dual, weight=2.0 * level.weight, **bounds)
         program = program_of(cells, motions, start=start, goal_nodes=fixed, value=level.guess)
         program.weight = level.weight
         if level.dual is not None:
@@ -157,11 +152,8 @@ def proofs(
         yield replace(_proof(cells, min(best, limit), total, work), function=function)
         if best >= limit * (1.0 - 1e-12) or ends(work):
             return
-        level.guess, level.dual, level.weight = (
-            program.value.astype(float),
-            program.dual,
-            program.weight,
-        )
+        level.guess, level.dual = program.value.astype(float), program.dual
+        level.weight = program.weight
         kept = _tube(level, program, found, at, seeds, fixed, limit, over)
         for index in (*seeds, *last):
             kept[index] = cells.active[index] > 0
@@ -237,9 +229,8 @@ def _tube(
     level.from_start = _lifted(program, level.from_start, sources, over, backward=True)
     whole = cells.value_at(found, at)
     onward = np.maximum(_least(cells, columns, level.to_goal), _least(cells, columns, found))
-    before = np.maximum(
-        _least(cells, columns, level.from_start), _least(cells, columns, whole - found)
-    )
+    before = _least(cells, columns, level.from_start)
+    before = np.maximum(before, _least(cells, columns, whole - found))
     return (cells.active > 0) & (np.maximum(onward, 0.0) + np.maximum(before, 0.0) < limit)
 
 
@@ -286,11 +277,8 @@ def _coarsest(
         along = (start[:2] - goal.pose[:2]) / max(apart, 1e-12)
         half = np.hypot(0.5 * total * along, beside * along[::-1])
         low, high = np.minimum(low, middle - half), np.maximum(high, middle + half)
-    for (
-        n_x,
-        n_y,
-        offset,
-    ) in scene.arrays.limits:  # bounds of the place, where they lie along an axis
+    # bounds of the place, where they lie along an axis
+    for n_x, n_y, offset in scene.arrays.limits:
         for axis, n in enumerate((n_x, n_y)):
             if abs(n) > 1.0 - 1e-12:
                 if n > 0.0:
@@ -350,9 +338,8 @@ def _in_the_plane(cells: PoseCells, fixed: NDArray[np.bool_], gears: int) -> Arr
     number = np.arange(n_i * n_j).reshape(n_i, n_j)
     i, j = np.nonzero(passable)
     a, b, c, d = number[i, j], number[i + 1, j], number[i, j + 1], number[i + 1, j + 1]
-    ends = np.concatenate(
-        [np.stack(p) for p in ((a, b), (a, c), (b, d), (c, d), (a, d), (b, c))], axis=1
-    )
+    pairs = (a, b), (a, c), (b, d), (c, d), (a, d), (b, c)
+    ends = np.concatenate([np.stack(pair) for pair in pairs], axis=1)
     ends = np.unique(np.sort(ends, axis=0), axis=1)
     across = (ends[1] - ends[0] != 1) & (ends[1] - ends[0] != n_j)
     lengths = np.where(across, math.sqrt(2.0), 1.0) * cells.size
@@ -360,8 +347,7 @@ def _in_the_plane(cells: PoseCells, fixed: NDArray[np.bool_], gears: int) -> Arr
     sources = number[fixed.any(axis=2)]
     found = dijkstra(graph, directed=False, indices=sources, min_only=True) / OCTILE
     found[~np.isfinite(found)] = 0.0
-    shape = (gears, *cells.nodes)
-    return np.broadcast_to(found.reshape(1, n_i, n_j, 1), shape).copy()
+    return np.broadcast_to(found.reshape(1, n_i, n_j, 1), (gears, *cells.nodes)).copy()
 
 
 def _spread(level: _Level, cells: PoseCells) -> NDArray[np.float32]:
@@ -379,9 +365,8 @@ def _spread(level: _Level, cells: PoseCells) -> NDArray[np.float32]:
     coarse = level.dual.reshape(-(-order.size // LANES), -1, LANES)
     dual = np.zeros((blocks, coarse.shape[1], LANES), dtype=np.float32)
     number = np.arange(len(index))
-    dual[number // LANES, :, number % LANES] = coarse[
-        owner // LANES, :, owner % LANES
-    ] * np.float32(0.125)
+    parent = coarse[owner // LANES, :, owner % LANES]
+    dual[number // LANES, :, number % LANES] = parent * np.float32(0.125)
     return dual.reshape(-1)
 
 

@@ -71,7 +71,6 @@ def program_of(
     """The program of a level, from the pose `start` to the nodes of the goal, from first values."""
     gears = 2 if motions.price > 0.0 else 1
     families, count = motions.families, cells.active.shape[2] + 1
-    columns = cells.columns
     base, layer = _blocks(cells)
     weights = _weights(cells, families)
     size = np.abs(weights)
@@ -94,7 +93,7 @@ def program_of(
     return BoundProgram(
         cells=cells,
         motions=motions,
-        columns=columns,
+        columns=cells.columns,
         base=base,
         layer=layer,
         rate=rate,
@@ -145,7 +144,7 @@ def raised(
     `backward`: it is one from the start, which rises along motions. It obeys the rows to within
     single precision; `slope` says how well.
     """
-    cells, families = program.cells, program.motions.families
+    cells, families, price = program.cells, program.motions.families, program.motions.price
     base, layer = _filled(program)
     table, rates = _directions(cells, families, 4)
     single = np.ascontiguousarray(value, dtype=np.float32)
@@ -171,9 +170,7 @@ def raised(
         if cells.round_trip:
             least = np.minimum(room[..., 0], room[..., -1])
             room[..., 0], room[..., -1] = least, least
-        _kernels_ascent.raise_nodes(
-            single.reshape(-1), room.reshape(-1), free, program.motions.price
-        )
+        _kernels_ascent.raise_nodes(single.reshape(-1), room.reshape(-1), free, price)
     return single.astype(np.float64)
 
 

@@ -110,9 +110,8 @@ def touched_all_round(
         turned = shapely.affinity.rotate(body, heading, origin=(0.0, 0.0), use_radians=True)
         if turned.distance(solid) >= max(margin - CONTACT, CONTACT):
             return False
-        if not any(
-            lever * half <= depth + margin - 2.0 * CONTACT for lever, depth in _held(turned, solid)
-        ):
+        deep = margin - 2.0 * CONTACT
+        if not any(lever * half <= depth + deep for lever, depth in _held(turned, solid)):
             waiting += [(heading - 0.5 * half, 0.5 * half), (heading + 0.5 * half, 0.5 * half)]
         if not waiting:
             return True

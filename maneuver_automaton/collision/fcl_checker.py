@@ -88,8 +88,7 @@ class FclChecker:
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
         here = self._seen("pose", pose)[None]
-        laid = self._laid_near(here, here)
-        hit = self._first_pose_hit(here, np.zeros(1, dtype=np.int64), laid)
+        hit = self._first_pose_hit(here, np.zeros(1, dtype=np.int64), self._laid_near(here, here))
         return None if hit is None else hit[1]
 
     def motions_hit(
@@ -178,8 +177,7 @@ class FclChecker:
             begin, end = close.pop()
             if end - begin == 1:
                 one = slice(begin, end)
-                hit = self._first_hit(poses[0, one], steps[one], np.ones(1), laid, ask)
-                if hit is not None:
+                if hit := self._first_hit(poses[0, one], steps[one], np.ones(1), laid, ask):
                     return begin, hit[1]
             elif self._sweep_hits(poses[:, begin:end], steps[begin:end], laid):
                 middle = (begin + end) // 2
@@ -191,8 +189,8 @@ class FclChecker:
         x, y, turn = steps.sum(axis=0).tolist()
         pieces = cut_where_it_pivots(self._body, (x, y, turn))
         whole = np.concatenate([poses[0], poses[1, -1:]])
-        skin = body_skin(swept_hulls(pieces, whole, steps))
-        return bool(_touching([_object(skin)], np.zeros((1, 3)), laid.static))
+        solid = _object(body_skin(swept_hulls(pieces, whole, steps)))
+        return bool(_touching([solid], np.zeros((1, 3)), laid.static))
 
     def _first_hit(
         self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
@@ -214,10 +212,8 @@ class FclChecker:
         while parts.coast.size:
             ask()
             of = parts.coast
-            solids = [
-                _sliced(self._body, kinds[k], level)
-                for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
-            ]
+            slices = zip(of.tolist(), parts.level.tolist(), strict=True)
+            solids = [_sliced(self._body, kinds[k], level) for k, level in slices]
             poses = coasted_at(starts, twists, of, parts.begins)
             hits = _touching([solid for solid, _ in solids], poses, laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
@@ -227,9 +223,8 @@ class FclChecker:
             if not sooner:
                 break
             parts = parts.of(np.array(sooner))
-            times = parts.begins + 0.5 * parts.lengths
-            middles = coasted_at(starts, twists, parts.coast, times)
-            hit = self._first_pose_hit(middles, parts.coast, laid)
+            of, times = parts.coast, parts.begins + 0.5 * parts.lengths
+            hit = self._first_pose_hit(coasted_at(starts, twists, of, times), of, laid)
             if hit is not None:
                 first, parts = hit, parts.of(parts.coast < hit[0])
             parts = halves(parts)

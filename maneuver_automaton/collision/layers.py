@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -42,19 +42,13 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
     """All obstacles that stand anywhere between neighbouring heights; no band without any."""
     layers = layers_of(obstacles, in_space=in_space)
     heights = {height for layer in layers for height in (layer.low, layer.high)}
-    bands = []
-    kept = sorted(heights)
+    bands, kept = [], sorted(heights)
     while len(kept) - 1 > MOST_LAYERS:  # the thinnest band joins its lower neighbour
         thinnest = int(np.argmin(np.diff(kept)))
         del kept[max(thinnest, 1)]
     for low, high in pairwise(kept):
-        numbers = sorted(
-            number
-            for layer in layers
-            if layer.low < high and layer.high > low
-            for number in layer.numbers
-        )
-        if numbers:
+        within = (layer.numbers for layer in layers if layer.low < high and layer.high > low)
+        if numbers := sorted(chain.from_iterable(within)):
             standing = tuple(obstacles[k] for k in numbers)
             bands.append(Layer(low, high, standing, tuple(numbers)))
     return tuple(bands) or (Layer(-math.inf, math.inf, (), ()),)
@@ -64,13 +58,9 @@ def always(
     obstacles: tuple[AnyObstacle, ...], *, low: float, high: float
 ) -> tuple[AnyObstacle, ...]:
     """Obstacles at every height between two, so that no path leads over or under them."""
-    lasting = [
-        number
-        for layer in layers_of(obstacles, in_space=True)
-        if layer.low <= low and layer.high >= high
-        for number in layer.numbers
-    ]
-    return tuple(obstacles[number] for number in sorted(lasting))
+    layers = layers_of(obstacles, in_space=True)
+    lasting = (layer.numbers for layer in layers if layer.low <= low and layer.high >= high)
+    return tuple(obstacles[number] for number in sorted(chain.from_iterable(lasting)))
 
 
 def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:
@@ -83,9 +73,8 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
             plane=plane.arrays.field,
             flat=bool(np.isinf(low).all() and np.isinf(high).all()),
         )
-    solids, of_static, of_moving = _concatenated(
-        [(one.solids, one.moving.solids) for one in arrays]
-    )
+    pairs = [(one.solids, one.moving.solids) for one in arrays]
+    solids, of_static, of_moving = _concatenated(pairs)
     shapes = np.array([one.field.distance.shape for one in arrays])
     distance = np.zeros((len(arrays), *shapes.max(axis=0)))
     most = max(len(one.buckets.start) for one in arrays)

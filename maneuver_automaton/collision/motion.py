@@ -90,8 +90,7 @@ class Motion:
         >>> Motion.of_plan(plan).at(2.0 + np.pi).round(6).tolist()
         [2.0, 2.0, 1.570796]
         """
-        times, poses, twists = plan.coasts
-        return cls(times, poses, twists)
+        return cls(*plan.coasts)
 
     def _refuse_gaps(self) -> None:
         """Raise a ValueError at the first pose that its twist does not lead to, or too fast."""
@@ -184,14 +183,11 @@ class Motion:
             return np.stack(columns, axis=-1)
         since = np.clip(times, self.time[0], self.time[-1])
         k = np.clip(np.searchsorted(self.time, since, side="right") - 1, 0, len(self.twist) - 1)
-        found = (
-            SE2(self.pose[k]) @ SE2.exp((since - self.time[k])[..., None] * self.twist[k])
-        ).pose
+        since = since - self.time[k]
+        found = np.array((SE2(self.pose[k]) @ SE2.exp(since[..., None] * self.twist[k])).pose)
         # The heading of a group element is one of many; that of a motion goes on from pose to pose.
-        found = np.array(found)
-        found[..., 2] = self.pose[k, 2] + (since - self.time[k]) * self.twist[k, 2]
-        late = times >= self.time[-1]
-        return np.where(late[..., None], self.pose[-1], found)
+        found[..., 2] = self.pose[k, 2] + since * self.twist[k, 2]
+        return np.where((times >= self.time[-1])[..., None], self.pose[-1], found)
 
     def times_for_lines(self, turn: float) -> Array:
         """Times (m,) between which lines stand for it: on arcs it turns no more than `turn` [rad].
@@ -205,10 +201,8 @@ class Motion:
             return self.time
         lasting = np.diff(self.time)
         counts = np.maximum(np.ceil(self.turn_rates * lasting / turn), 1.0).astype(np.int64)
-        begins = [
-            first + step * np.arange(n) / n
-            for first, step, n in zip(self.time[:-1], lasting, counts.tolist(), strict=True)
-        ]
+        lines = zip(self.time[:-1], lasting, counts.tolist(), strict=True)
+        begins = [first + step * np.arange(n) / n for first, step, n in lines]
         return np.append(np.concatenate([np.zeros(0), *begins]), self.time[-1])
 
     def moved(self, by: LieGroup) -> Motion:

@@ -88,10 +88,8 @@ class ObstacleDistances:
             part.at(poses), max_distance=limit, return_distance=True, all_matches=False
         )
         found = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
-        found.distance[rows], found.owner[rows] = (
-            np.maximum(away - part.radius, 0.0),
-            self.owners[which],
-        )
+        found.distance[rows] = np.maximum(away - part.radius, 0.0)
+        found.owner[rows] = self.owners[which]
         return found
 
     def _nearest_single(
@@ -112,10 +110,8 @@ class ObstacleDistances:
         ]
         reaches = np.array([part.reach + single.part.reach for single in self.singles])
         limit = np.minimum(best.distance, (np.array(between).T + reaches).min(axis=1))
-        for single, frame, middles, reach in zip(
-            self.singles, frames, between, reaches, strict=True
-        ):
-            near = middles - reach <= np.minimum(limit, best.distance)
+        for single, frame, middles, far in zip(self.singles, frames, between, reaches, strict=True):
+            near = middles - far <= np.minimum(limit, best.distance)
             rows = np.flatnonzero(near & np.isfinite(middles))
             away = np.full(len(poses), math.inf)
             apart = shapely.distance(cores[rows], single.part.at(frame[rows]))
@@ -145,9 +141,7 @@ def surroundings_around(
     import shapely
 
     to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
-    cores: list[Any] = []
-    owners: list[int] = []
-    singles: list[_Single] = []
+    cores, owners, singles = list[Any](), list[int](), list[_Single]()
     for index, far in enumerate(obstacles):
         obstacle = far.moved(to_origin)
         if isinstance(obstacle, OccupancyMap):
@@ -161,17 +155,12 @@ def surroundings_around(
             else:
                 moves = obstacle.motion or STANDS
                 singles.append(_Single(part, moves, index, obstacle.presence))
+    speeds = [s.motion.fastest(float(np.hypot(*s.part.middle)) + s.part.reach) for s in singles]
     return ObstacleDistances(
         tree=shapely.STRtree(cores),
         owners=np.array(owners, dtype=np.int64),
         singles=tuple(singles),
-        speed=max(
-            (
-                one.motion.fastest(float(np.hypot(*one.part.middle)) + one.part.reach)
-                for one in singles
-            ),
-            default=0.0,
-        ),
+        speed=max(speeds, default=0.0),
     )
 
 

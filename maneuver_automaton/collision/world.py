@@ -128,9 +128,8 @@ def world_of(
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
     static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
-    there = present or tuple(one.presence for one in moving)
     followed = tuple(_moving_of(obstacle) for obstacle in moving)
-    where = followed, pose, there, body.reach
+    where = followed, pose, present or tuple(one.presence for one in moving), body.reach
     moving_arrays = _moving_obstacles(*where) if followed else NOTHING_MOVES
     times = np.concatenate([moving_arrays.time, moving_arrays.present.ravel()])
     return World(
@@ -233,9 +232,7 @@ def _box(boxes: Array, moving: tuple[_Moving, ...], frame: Array) -> Array:
     if moving:
         back = SE2(frame).inverse()
         ways = np.asarray(back.act(np.concatenate([one.way for one in moving])))
-        reaches = np.repeat([one.reach for one in moving], [len(one.way) for one in moving])[
-            :, None
-        ]
+        reaches = np.concatenate([np.full((len(one.way), 1), one.reach) for one in moving])
         low, high = np.vstack([low, ways - reaches]), np.vstack([high, ways + reaches])
     if not len(low):
         return np.array([math.inf, math.inf, -math.inf, -math.inf])

@@ -175,10 +175,9 @@ def design_library(
     if disc is not None and max_trims is not None:
         words = _short_words(disc, max_trims, tolerance=tolerance, most_boxes=most_boxes)
     hardest = int(mixing_factors(twists, rates, best.chosen).argmax())
+    chosen = tuple(trims[k] for k in best.chosen)
     return DesignedLibrary(
-        automaton=Automaton(
-            candidates.model, tuple(trims[k] for k in best.chosen), name=candidates.name
-        ),
+        automaton=Automaton(candidates.model, chosen, name=candidates.name),
         candidates=len(trims),
         within=within,
         factor=best.factor if words is None else words.factor,
@@ -233,13 +232,12 @@ def _disc(
     _check_positive("radius", radius, "m")
     least = 0.5 * turning_radius if least is None else least
     _check_positive("least", least, "m")
-    sampled = poses_in_ball(radius, SAMPLES, seed=SEED)
     return _Disc(
         turning_radius=turning_radius,
         reverse=reverse,
         radius=radius,
         least=least,
-        goals=np.concatenate([posed, sampled]),
+        goals=np.concatenate([posed, poses_in_ball(radius, SAMPLES, seed=SEED)]),
     )
 
 
@@ -269,9 +267,7 @@ def _circle(points: Array, choice: Choice) -> tuple[float, bool] | None:
     ahead, turn = points[:, 0], points[:, 2]
     if np.delete(points, (0, 2), axis=1).any() or not turn.any() or not (ahead > 0.0).any():
         return None
-    speed = float(ahead.max())
-    reverse = bool((ahead < 0.0).any())
-    moving = ahead > 0.0
+    speed, reverse, moving = float(ahead.max()), bool((ahead < 0.0).any()), ahead > 0.0
     if reverse:
         rate = float(np.abs(turn).max())
     elif (turn[~moving] != 0.0).any():

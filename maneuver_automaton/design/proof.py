@@ -143,9 +143,7 @@ def _worst(
     counts = np.isfinite(ratios) & (np.hypot(goals[:, 0], goals[:, 1]) <= reach)
     ratios = np.where(counts, ratios, 1.0)
     k = int(ratios.argmax()) if len(ratios) else -1
-    if k < 0 or not ratios[k] > met[0]:
-        return met
-    return float(ratios[k]), goals[k]
+    return (float(ratios[k]), goals[k]) if k >= 0 and ratios[k] > met[0] else met
 
 
 def _box_ratios(low: Array, size: Array, max_trims: int, least: float) -> Array:

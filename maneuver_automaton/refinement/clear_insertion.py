@@ -92,8 +92,7 @@ class Whole:
         for _ in range(max(LEAST, SHARE * step)):
             if budget.is_over or self.idle >= PATIENCE:
                 return
-            self.attempts += 1
-            self.idle += 1
+            self.attempts, self.idle = self.attempts + 1, self.idle + 1
             better = work.attempt(self.rng.random(7), self.rng.standard_normal(3))
             if better is None:
                 continue
@@ -186,26 +185,22 @@ class _Work:
         moving = self.word.durations > 0.0
         trims, times = self.word.trims[moving], self.word.durations[moving]
         ends = np.cumsum(times)
-        total = float(ends[-1])
+        joints, total = np.append(0.0, ends), float(ends[-1])
         span = total * SHORTEST ** draws[2]
         begin = max(draws[1] * total - 0.5 * span, 0.0)
         end = min(draws[1] * total + 0.5 * span, total)
-        joints = np.append(0.0, ends)
         if draws[3] < SNAP:
             begin = float(joints[np.abs(joints - begin).argmin()])
         if draws[4] < SNAP:
             end = float(joints[np.abs(joints - end).argmin()])
         if not end > begin:
             return None
-        cuts = [begin, end]
-        if draws[0] < VIA:
-            cuts = [begin, 0.5 * (begin + end), end]
+        cuts = [begin, *([0.5 * (begin + end)] if draws[0] < VIA else []), end]
         pieces = [_cut(trims, times, ends, a, b) for a, b in pairwise(cuts)]
         goals = [self._moved(piece) for piece in pieces]
         if len(pieces) > 1:
             size = SPREAD * self.query.library.radius * (1.0 / 100.0) ** draws[5]
-            turn = 0.5 * size / self.query.library.radius
-            via = SE2(shift * np.array([size, size, turn]))
+            via = SE2(shift * np.array([size, size, 0.5 * size / self.query.library.radius]))
             goals = [goals[0] @ via, via.inverse() @ goals[1]]
         steps: list[tuple[int, float]] = []
         rounds = 1 + int(draws[6] * ROUNDS)

@@ -36,17 +36,13 @@ def broken_condition(problem: Problem, plan: Plan) -> str:
     These are the conditions that no collision check and no simulation can see: the horizon, the
     number of trims, the least time of a trim that moves, and the longest time of every trim.
     """
-    horizon = problem.horizon
-    duration = plan.duration
+    horizon, duration = problem.horizon, plan.duration
     if horizon.time is not None and abs(duration - horizon.time) > _slack(horizon.time):
         return f"it takes {duration:.6g} s, {horizon.time:g} s are asked"
     if horizon.max_time is not None and duration > horizon.max_time + _slack(horizon.max_time):
         return f"it takes {duration:.6g} s, at most {horizon.max_time:g} s are admitted"
-    lasting = [
-        (trim, float(time))
-        for trim, time in zip(plan.trims, plan.durations, strict=True)
-        if time > NO_TIME
-    ]
+    times = zip(plan.trims, plan.durations.tolist(), strict=True)
+    lasting = [(trim, time) for trim, time in times if time > NO_TIME]
     if horizon.max_trims is not None and len(lasting) > horizon.max_trims:
         return f"it has {len(lasting)} trims, {horizon.max_trims} are admitted"
     for trim, time in lasting:
@@ -353,7 +349,7 @@ def _displacements(plan: Plan) -> Array:
     """Displacement (n - 1, dof) after each trim but the last; zero for a switch."""
     steps = np.zeros((len(plan.trims) - 1, plan.start.size))
     for k, one in enumerate(plan.maneuvers):
-        steps[k] = 0.0 if one is None else one.displacement
+        steps[k] = one.displacement if one else 0.0
     return steps
 
 
@@ -380,8 +376,7 @@ def without_nothing(plan: Plan) -> Plan:
         plan.maneuvers and plan.duration > 0.0
     ):
         return plan
-    word: list[int] = []
-    lasting: list[float] = []
+    word, lasting = list[int](), list[float]()
     for k, time in enumerate(plan.durations.tolist()):
         if time == 0.0:
             continue
@@ -410,20 +405,16 @@ def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Arra
             lasts = plan.durations > 0.0
             lasts[list(changed)] ^= True
             lasts &= longest >= least_coast
-            yield (
-                np.where(still | ~lasts, 0.0, least_coast),
-                np.where(still | lasts, longest, 0.0),
-            )
+            floors = np.where(still | ~lasts, 0.0, least_coast)
+            yield floors, np.where(still | lasts, longest, 0.0)
 
 
 def _solved(problem: Problem, plan: Plan, goal: Goal, least: Array, longest: Array) -> Plan | None:
     """The word of a plan with the best times within limits, as long as the horizon asks for."""
     group = problem.automaton.model.group
     lasting = sum(one.duration for one in plan.maneuvers if one)
-    horizon = problem.horizon
-    totals = [horizon.time]
-    if horizon.max_time is not None:
-        totals = [None, horizon.max_time]
+    time, most = problem.horizon.time, problem.horizon.max_time
+    totals = [time] if most is None else [None, most]
     rates = problem.rates_of(plan)
     for total in totals:
         left = None if total is None else total - lasting

@@ -27,12 +27,8 @@ from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 
-PRICES = (  # of a change of direction, and of a switch of trims, in the time of a turning radius
-    (0.8, 0.0),
-    (0.3, 0.8),
-    (0.3, 0.3),
-    (2.0, 0.0),
-)
+# of a change of direction, and of a switch of trims, in the time of a turning radius
+PRICES = (0.8, 0.0), (0.3, 0.8), (0.3, 0.3), (2.0, 0.0)
 BRIEF = Patience(attempts=300, passes=1)
 MOST = 20_000  # expansions of one search, unless the problem asks for fewer
 STROKE_TOLERANCE = 0.15  # share of a stroke by which like sequences may differ
@@ -71,10 +67,8 @@ def car_library(
     angle = math.atan(share * math.tan(max_steering))
     turns = {"left": angle, "straight": 0.0, "right": -angle}
     gears = {"ahead": 1.0, "back": -1.0} if reverses else {"ahead": 1.0}
-    car = Car(wheelbase=wheelbase, max_steering=max_steering)
-    return Automaton.of_controls(
-        car, {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
-    )
+    controls = {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
+    return Automaton.of_controls(Car(wheelbase=wheelbase, max_steering=max_steering), controls)
 
 
 @functools.lru_cache(maxsize=16)
@@ -129,9 +123,8 @@ def gear_sequences(
 def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     """Plans of one search: its first one improved, and the others that it found."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
-    table = cost_to_go_table(problem)
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
-    schedule = WordSchedule(most=most, patience=BRIEF, table=table)
+    schedule = WordSchedule(most=most, patience=BRIEF, table=cost_to_go_table(problem))
     timed = replace(budget, expansions=None)
     found = words_of(query, budget=timed, schedule=schedule).to_the_end()
     words = (found.word, *found.others[:OTHERS]) if found.word is not NO_WORD else ()

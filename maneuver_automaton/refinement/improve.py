@@ -305,23 +305,17 @@ class WordSearch:
             self.queries += one.queries - asked
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
             if word is not None and word.cost < last and not self._over():
-                last = word.cost
-                yield from self._made_of(word, restart)
+                last, candidate = word.cost, self._shortened(word, restart, SLICE)
+                if candidate.cost < NEAR * self.best.cost:
+                    candidate = self._attempted(candidate, SECOND_SLICE)
+                yield from self._considered(candidate)
             if word is not None and restart.resolution.stop:
                 break
         self.arrays = one.arrays
 
-    def _made_of(self, found: Word, restart: Restart) -> Iterator[Word]:
-        """The word of a new search, shortened."""
-        candidate = self._shortened(found, restart, SLICE)
-        if candidate.cost < NEAR * self.best.cost:
-            candidate = self._attempted(candidate, SECOND_SLICE)
-        yield from self._considered(candidate)
-
     def _shortened(self, word: Word, restart: Restart, attempts: int) -> Word:
         """The word after rounds of the dynamic program and some attempts."""
-        arrays = self.query.library.arrays.library
-        restarts = self.restarts
+        arrays, restarts = self.query.library.arrays.library, self.restarts
         rounds = restarts.moving_rounds if self.query.moves else restarts.rounds
         most = len(arrays.tried.words) if restart.all_words else arrays.tried.n_few
         for n_words in sorted({arrays.tried.n_few, most}):
@@ -345,8 +339,7 @@ class WordSearch:
             first = 0
             while step := pace.take(n - first):
                 some = slice(first, first + step)
-                draws = uniform[some], normal[some]
-                attempt_all(one, *draws)
+                attempt_all(one, uniform[some], normal[some])
                 first += step
             self.attempts += first
             done += n

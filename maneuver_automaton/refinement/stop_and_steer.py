@@ -53,11 +53,8 @@ def stop_and_steer(model: StopsAndSteers, path: Plan, *, first: Trim, last: Trim
             raise ValueError(f"{what} trim {trim.name!r}: it moves, need one that stands still")
     word = _Word(model, trims={first.name: first, last.name: last})
     at = first
-    strokes = groupby(
-        zip(path.trims, path.durations.tolist(), strict=True),
-        key=lambda one: one[0].body_velocity.tobytes(),
-    )
-    for _, group in strokes:
+    coasts = zip(path.trims, path.durations.tolist(), strict=True)
+    for _, group in groupby(coasts, key=lambda one: one[0].body_velocity.tobytes()):
         pieces = list(group)
         twist, length = pieces[0][0].body_velocity, math.fsum(time for _, time in pieces)
         if not twist.any() or not length > SHORTEST:
@@ -138,9 +135,8 @@ class _Word:
     def _maneuver(
         self, name: str, source: Trim, target: Trim, control: Array, duration: float
     ) -> None:
-        course = drive(
-            self.model, source.reduced_state, control=control[None], durations=[duration]
-        )
+        state, controls = source.reduced_state, control[None]
+        course = drive(self.model, state, control=controls, durations=[duration])
         self.trims[source.name], self.trims[target.name] = source, target
         self.primitives.append(
             Maneuver(

@@ -112,12 +112,8 @@ def word_of(one: Improving, word: Word, query: LatticeQuery) -> Word:
     """The word that arrays hold."""
     n, library, now = int(one.word.length[0]), query.library, one.word.now
     maneuvers = np.append(library.arrays.edges.maneuver, SWITCH)[now.edges[:n]]
-    steps = zip(
-        maneuvers.tolist(),
-        library.trims[now.trims[:n]].tolist(),
-        now.durations[:n].tolist(),
-        strict=True,
-    )
+    trims, durations = library.trims[now.trims[:n]].tolist(), now.durations[:n].tolist()
+    steps = zip(maneuvers.tolist(), trims, durations, strict=True)
     return with_cost(word_of_steps(steps, goal=word.goal), query)
 
 
@@ -133,9 +129,8 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
     # Of many trims a few of the cheapest words do nearly the same, and meet the same obstacle.
     tried = library.arrays.library.tried
     all_of_them = library.at_will and len(library.trims) > MOST_TRIMS
-    tries = len(tried.words) if all_of_them else TRIES
     return ImproveTask(
-        tries=tries,
+        tries=len(tried.words) if all_of_them else TRIES,
         limits=limits_of(query),
         given_ends=query.start_trim >= 0,
         per_metre=min(float(library.per_metre), least),

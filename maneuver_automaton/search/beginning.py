@@ -77,10 +77,8 @@ class Begun:
         """The search that was begun, ready to go on."""
         call, search = self.call, self.call.search
         if not self.is_found:
-            coarse, grid = call.resolution.coarse, search.grid
-            grid = laid_grid(
-                query.plane, query.box, query.window, query.start, coarse=coarse, like=grid
-            )
+            laid = query.plane, query.box, query.window, query.start
+            grid = laid_grid(*laid, coarse=call.resolution.coarse, like=search.grid)
             task = task_of(query, call.resolution)
             search = search._replace(task=task, scene=query.scene(), grid=grid)
         return Pass(
@@ -179,11 +177,8 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         table=NO_TABLE,
     )
     n = 1 + len(query.goals)
-    to_x, to_y, turn = world.frame.tolist()
-    low_x, low_y, high_x, high_y = world.box.tolist()
-    (least_x, most_x), (least_y, most_y) = (
-        pair or (-math.inf, math.inf) for pair in (bounds.x, bounds.y)
-    )
+    turn = float(world.frame[2])
+    x, y = (pair or (-math.inf, math.inf) for pair in (bounds.x, bounds.y))
     arrays = FirstCallArrays(
         poses=np.zeros((n, 3)),
         seen=np.zeros((n, 4)),
@@ -191,11 +186,11 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         margin=np.zeros(1),
         window_box=query.box.copy(),
         asked=np.zeros(1, dtype=np.int64),
-        frame=(to_x, to_y, turn, float(np.cos(-turn)), float(np.sin(-turn))),
-        box=(low_x, low_y, high_x, high_y),
+        frame=(*world.frame.tolist(), float(np.cos(-turn)), float(np.sin(-turn))),
+        box=tuple(world.box.tolist()),
         pad=float(pad_around(world, library.radius)),
         bounded=bounds.x is not None,
-        bounds=(float(least_x), float(least_y), float(most_x), float(most_y)),
+        bounds=(float(x[0]), float(y[0]), float(x[1]), float(y[1])),
         margins=Margins(
             clearly=CLEARLY,
             usual=float(usual_margin(library, world)),

@@ -41,9 +41,8 @@ def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
         return None
     priced = _priced(problem, goal, word)
     lasting = np.flatnonzero(priced.times > 0.0)
-    p = kernels.multipliers_of_word(
-        _library(priced.twists, priced.rates, priced.rows), lasting, priced.times[lasting].copy()
-    )
+    library = _library(priced.twists, priced.rates, priced.rows)
+    p = kernels.multipliers_of_word(library, lasting, priced.times[lasting].copy())
     best, cut = priced.least(p)
     columns, enough = priced.columns(), -NEGLIGIBLE * priced.scale
     if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
@@ -116,11 +115,10 @@ class PricedWord:
     def columns(self) -> Array:
         """Derivatives (3 + m, n) of all conditions by the times that are not zero."""
         poses = self.poses()
+        lasting = np.flatnonzero(self.times > 0.0)
+        end = poses[-1]
         return np.array(
-            [
-                _column(self.twists[i], self.rows[:, i], poses[i], poses[-1])
-                for i in np.flatnonzero(self.times > 0.0)
-            ]
+            [_column(self.twists[i], self.rows[:, i], poses[i], end) for i in lasting]
         ).T
 
     def poses(self) -> Array:

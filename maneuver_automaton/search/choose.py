@@ -11,6 +11,7 @@ and the answer in common.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -18,7 +19,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Automaton, Plan
@@ -85,18 +85,11 @@ def search_goal(
     upper_bound = math.inf
     if known is not None:
         upper_bound = problem.cost_of(known) if known_cost is None else known_cost
+    words = functools.partial(
+        search_words, goal=goal, alternatives=alternatives, budget=budget, ties=ties
+    )
     if method == "words" or (method == "auto" and _affordable(problem, goal)):
-        return [
-            search_words(
-                problem,
-                goal,
-                alternatives=alternatives,
-                budget=budget,
-                upper_bound=upper_bound,
-                ties=ties,
-                not_first=not_first,
-            )
-        ]
+        return [words(problem, upper_bound=upper_bound, not_first=not_first)]
     results = [
         search_insertion(
             problem,
@@ -115,14 +108,7 @@ def search_goal(
             best = min((one.cost for one in results[0].solutions), default=math.inf)
             if alternatives == 0:
                 upper_bound = min(upper_bound, best)
-            short = search_words(
-                few,
-                goal,
-                alternatives=alternatives,
-                budget=budget,
-                upper_bound=upper_bound,
-                ties=ties,
-            )
+            short = words(few, upper_bound=upper_bound)
             proven = short.exhaustive and three_are_enough(problem)
             results.append(replace(short, exhaustive=proven))
     return results
@@ -176,9 +162,7 @@ def search_with_least_times(
         for rest in (False, True) if padded else (False,):
             if len(word) + rest <= most:
                 found += _solved(problem, setup, word, rest=rest)
-    solutions = tuple(in_order(found))
-    if alternatives is not None:
-        solutions = solutions[: alternatives + 1]
+    solutions = tuple(in_order(found))[: None if alternatives is None else alternatives + 1]
     return SearchResult(
         status=SearchStatus.FOUND if solutions else status,
         solutions=solutions,
@@ -230,13 +214,8 @@ def _solved(
         return []
     if rest and times[-1] <= 1e-9:
         return []  # the same word without rest is tried too
-    return [_priced(problem, Word(trims=trims, durations=times, cost=0.0), rates)]
-
-
-def _priced(problem: Problem, solution: Word, rates: Array) -> Word:
-    velocities = problem.automaton.body_velocities[solution.trims]
-    cost = float(rates @ solution.durations) + problem.cost.switching(velocities)
-    return replace(solution, cost=cost)
+    switching = problem.cost.switching(problem.automaton.body_velocities[trims])
+    return [Word(trims=trims, durations=times, cost=float(rates @ times) + switching)]
 
 
 def search_insertion(

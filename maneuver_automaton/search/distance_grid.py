@@ -148,10 +148,7 @@ def with_cells(grid: DistanceGrid, n: int) -> DistanceGrid:
         mark=np.zeros(n, dtype=np.uint8),
         state=np.zeros(6, dtype=np.int64),
         queue=CellQueue(
-            keys=np.zeros(most),
-            items=np.zeros(most, dtype=np.int64),
-            links=np.zeros(most, dtype=np.int64),
-            heads=np.zeros(BUCKETS, dtype=np.int64),
+            np.zeros(most), *(np.zeros(room, dtype=np.int64) for room in (most, most, BUCKETS))
         ),
     )
 

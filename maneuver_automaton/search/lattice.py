@@ -148,9 +148,7 @@ def first_plan(
         else None,
     )
     for search in passes:
-        if (
-            begun is None or search is not turns[0].begun
-        ):  # whose arrays are those of the first call
+        if begun is None or search is not turns[0].begun:  # its arrays are those of the first call
             give_back(query.prepared, search.query.library, search.arrays)
     return found
 

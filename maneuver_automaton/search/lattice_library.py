@@ -147,8 +147,8 @@ def lattice_library(
         return _library_on(problem.setting, automaton, prepared)
     first = automaton.index_of(problem.first_trim.name)
     lasts = {automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals}
-    ends = tuple(sorted(lasts))
-    return _library_on(problem.setting, part_between(automaton, first, ends), prepared)
+    part = part_between(automaton, first, tuple(sorted(lasts)))
+    return _library_on(problem.setting, part, prepared)
 
 
 @kept_by_first
@@ -333,7 +333,7 @@ def motion_along(
     climbs = automaton.body_velocities[:, 3:].sum(axis=1)
     ends = np.stack([climbs[sources], climbs[targets]], axis=1)
     found, counts, speeds, heights = [], [np.zeros(1, dtype=np.int64)], [], []
-    spans: list[IntArray] = []
+    spans = list[IntArray]()
     for p in range(len(parts) + 1):
         body = bodies[p] if p < len(parts) else None
         table = own if body is None else twists[p]
@@ -388,9 +388,8 @@ def coasts_of(
     """Coasts by twists (m, 4) for times (m, k) [s], negative ones backwards; what they last."""
     steps = times[..., None] * twists[:, None, :]
     moves = np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
-    return CoastArrays(
-        times if durations is None else durations, moves, swept_areas(body, twists, times)
-    )
+    lasting = times if durations is None else durations
+    return CoastArrays(lasting, moves, swept_areas(body, twists, times))
 
 
 def edge_durations_of(twists: Array, radius: float, *, waits: bool) -> Array:
@@ -450,9 +449,9 @@ def altitude_ranges(
     rows, swings = [], []
     for maneuver, (before, after) in zip(maneuvers, climbs.tolist(), strict=True):
         if maneuver.displacement.size == 3:
-            n = 2 if maneuver.course is None else len(maneuver.course.time)
-            rows.append(np.zeros(n))
-            swings.append(np.zeros(n))
+            none = np.zeros(2 if maneuver.course is None else len(maneuver.course.time))
+            rows.append(none)
+            swings.append(none)
             continue
         if maneuver.course is None:
             z, t = np.array([0.0, maneuver.displacement[3]]), np.array([0.0, maneuver.duration])

@@ -195,8 +195,7 @@ def lattice_query(
     # the usual clearance, at most half of that at start and goals
     halves = [0.5 * one for one in clear.tolist() if one > 0.0]
     margin = float(max(LEAST_MARGIN, min([usual_margin(library, worlds.whole), *halves])))
-    radius = library.radius
-    box, window, bounded = window_of(problem.bounds, worlds.outer, seen, radius=radius)
+    box, window, bounded = window_of(problem.bounds, worlds.outer, seen, radius=library.radius)
     most = horizon.max_time if horizon.time is None else horizon.time
     return LatticeQuery(
         problem=problem,
@@ -238,8 +237,7 @@ def _end_clearances(
             around = world if world.body is body else replace(world, body=body)
             aside = clearances(around, there, times=times)
             if worlds.flat is None:
-                above = band.clearance(ends[:, 3] + level, problem.body_height)
-                aside = np.maximum(aside, above)
+                aside = np.maximum(aside, band.clearance(ends[:, 3] + level, problem.body_height))
             found.append(aside)
     least: Array = found[0] if len(found) == 1 else np.min(found, axis=0)
     return least - problem.margin
@@ -250,6 +248,5 @@ def usual_margin(library: LatticeLibrary, world: World) -> float:
     if library.half_width:
         return MARGIN * library.half_width
     width = world.box[2:] - world.box[:2]  # a length of the world, for vehicles that are points
-    return MARGIN * (
-        float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
-    )
+    length = 0.02 * width.max() if np.isfinite(width).all() else 1.0
+    return MARGIN * float(np.clip(length, 1e-3, 1.0))

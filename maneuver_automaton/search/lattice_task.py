@@ -186,10 +186,9 @@ def _layers(
         least_coast > 0.0 or library.limits_coasts or (resolution.layered and numbered.switch > 0.0)
     )
     by_count = most_trims > 0
-    layers = (
-        len(numbered.transitions.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
-    )
-    return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
+    layers = len(numbered.transitions.cost) * (numbered.n_trims + 1 if by_trim else 1)
+    layers *= (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    return by_gear, by_trim, by_count, layers
 
 
 def goal_roots(query: LatticeQuery) -> EndArrays:
@@ -310,12 +309,8 @@ def schedule_of(library: LatticeLibrary) -> Schedule:
     fast = as_wide_as_turns(library)
     (_, first), *later = LINKED.stages
     stages = ((0, fast), (FAST_ALONE, first), *later) if fast else LINKED.stages
-    return LINKED._replace(
-        stages=tuple(
-            (after, tuple(replace(one, ends_early=True) for one in begun))
-            for after, begun in stages
-        )
-    )
+    early = ((k, tuple(replace(one, ends_early=True) for one in begun)) for k, begun in stages)
+    return LINKED._replace(stages=tuple(early))
 
 
 def first_resolutions(library: LatticeLibrary, settings: SearchSettings) -> tuple[Resolution, ...]:

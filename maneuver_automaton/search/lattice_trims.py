@@ -91,6 +91,8 @@ def trims_at_will(
     if choice is not None:
         moving = moving[np.isin(trims[moving], choice.words)]
     words = _words(moving, twists)
+    pairs = [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+    pairs = pairs or [(int(i), int(i), m) for i in moving]
     arrays = library_arrays(four_columns(twists), rates, identities(automaton), trims=trims)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_radian = np.where(twists[:, 2] != 0.0, rates / np.abs(twists[:, 2]), np.inf)
@@ -105,11 +107,7 @@ def trims_at_will(
                 _with_prices(arrays, cost)._replace(min_coast=float(min_coast)),
                 words,
                 len(words),
-                np.array(
-                    [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
-                    or [(int(i), int(i), m) for i in moving],
-                    dtype=np.int64,
-                ).reshape(-1, 3),
+                np.array(pairs, dtype=np.int64).reshape(-1, 3),
             ),
         ),
         wide=not spins,
@@ -138,9 +136,8 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     Where maneuvers do, each has the price of the switch to it and of those within it; a switch to a
     coast, and a change of direction between two maneuvers, are left to whoever compares plans.
     """
-    rest = None
+    rest = library.automaton.rest if library.automaton.is_kinematic else None
     if library.automaton.is_kinematic:
-        rest = library.automaton.rest
         library = replace(library, arrays=_with_prices(library.arrays, cost))
     return PricedTrims(
         library=library,

@@ -113,11 +113,8 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
 
 def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     """The bounds of `closed_bound`, each by what it counts; a distance of 0 where none is known."""
-    library, relative = (
-        moving_trims(problem.automaton, problem.cost),
-        goal_from_start(problem, goal),
-    )
-    limit = problem.horizon.time
+    limit, library = problem.horizon.time, moving_trims(problem.automaton, problem.cost)
+    relative = goal_from_start(problem, goal)
     pads = limit is not None and library.rest is not None
     prices = _prices(problem.automaton, problem.cost, pads) if len(library.rates) else None
     if prices is None or is_still(relative, free_heading=goal.free_heading):

@@ -74,17 +74,12 @@ def parts_of(
     ]
     in_trims = model.part_poses(np.array([trim.reduced_state for trim in automaton.trims]))
     along = [model.part_poses(state) for state in states]
-    return (
-        own,
-        *(
-            Part(
-                shapes=tuple(shapes),
-                trim_poses=in_trims[:, k],
-                course_poses=tuple(poses[:, k] for poses in along),
-            )
-            for k, shapes in enumerate(carried)
-        ),
-    )
+    parts = [own]
+    for k, shapes in enumerate(carried):
+        followed = tuple(poses[:, k] for poses in along)
+        part = Part(shapes=tuple(shapes), trim_poses=in_trims[:, k], course_poses=followed)
+        parts.append(part)
+    return tuple(parts)
 
 
 def posed_parts(
@@ -102,8 +97,6 @@ def posed_parts(
 
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
     """The arrays of several bodies as one."""
-    pieces = [len(body.radius) for body in bodies]
-    discs = [len(body.discs) for body in bodies]
     offsets = np.cumsum([0, *(len(body.edges) for body in bodies)])
     first = [body.first[:-1] + offset for body, offset in zip(bodies, offsets, strict=False)]
     sizes = [
@@ -115,8 +108,8 @@ def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
         first=np.concatenate([*first, offsets[-1:]]).astype(np.int64),
         radius=np.concatenate([body.radius for body in bodies]),
         discs=np.concatenate([body.discs for body in bodies]),
-        piece_of=np.cumsum([0, *pieces]),
-        disc_of=np.cumsum([0, *discs]),
+        piece_of=np.cumsum([0, *(len(body.radius) for body in bodies)]),
+        disc_of=np.cumsum([0, *(len(body.discs) for body in bodies)]),
         sizes=np.array(sizes, dtype=np.float64),
     )
 

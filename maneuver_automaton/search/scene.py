@@ -128,7 +128,9 @@ def _worlds(
     dear = tuple(Obstacle(shape) for cost in costs for shape in extent_of(cost))
     between = tuple(around(band.obstacles) for band in bands)
     beside = tuple(around((one,)) for one in solid)
-    everywhere = np.full(len(between) + len(beside), np.inf)
+    high, flat = np.full(len(between) + len(beside), np.inf), None
+    if heights is None:
+        flat = layer_arrays([*between, *beside], low=-high, high=high, plane=plane)
     return Worlds(
         whole=whole,
         plane=plane,
@@ -136,9 +138,7 @@ def _worlds(
         between=between,
         zones=beside,
         outer=around((*obstacles, *solid, *dear)) if solid or dear else whole,
-        flat=None
-        if heights is not None
-        else layer_arrays([*between, *beside], low=-everywhere, high=everywhere, plane=plane),
+        flat=flat,
     )
 
 
@@ -165,10 +165,9 @@ def window_of(
     if bounds.x is None and bounds.y is None:
         window = np.array([low_x, low_y, high_x, high_y, 0.0, 0.0, 1.0, 0.0, 0.0])
         return window[:4], window, False
-    low, high = np.array([low_x, low_y]), np.array([high_x, high_y])
     turn = float(world.frame[2])
     c, s = math.cos(turn), math.sin(turn)
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    corners = np.array([[low_x, low_y], [high_x, low_y], [high_x, high_y], [low_x, high_y]])
     seen = corners @ np.array([[c, s], [-s, c]])  # along the axes of the problem
     low, high = seen.min(axis=0), seen.max(axis=0)
     for axis, pair in enumerate((bounds.x, bounds.y)):
@@ -201,9 +200,8 @@ def scene_of(
     admitted = _admitted(library, problem.setting)
     edge_window = window.copy()
     edge_window[8] -= library.worst_error
-    lowest, highest = -math.inf, math.inf
-    if problem.bounds.z is not None and problem.start.size > 3:
-        lowest, highest = problem.bounds.z
+    heights = problem.bounds.z if problem.start.size > 3 else None
+    lowest, highest = heights or (-math.inf, math.inf)
     return Scene(
         layers=_layers(problem, worlds, problem.margin + margin + ROUNDED, level),
         keep=float(problem.margin),
@@ -234,9 +232,8 @@ def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scen
     """A scene for another library of the same trims."""
     edge_window = scene.window.copy()
     edge_window[8] -= library.worst_error
-    return scene._replace(
-        edge_window=edge_window, zone_pieces=_admitted(library, problem.setting)[1]
-    )
+    zone_pieces = _admitted(library, problem.setting)[1]
+    return scene._replace(edge_window=edge_window, zone_pieces=zone_pieces)
 
 
 def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> LayerArrays:

@@ -121,15 +121,8 @@ def few_of(library: MovingTrims) -> MovingTrims:
     for angle in np.arange(8) * np.pi / 4.0:
         choose(np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 2], everything)
     few = list(dict.fromkeys(chosen))
-    return replace(
-        library,
-        trims=library.trims[few],
-        twists=twists[few],
-        rates=rates[few],
-        periods=library.periods[few],
-        speeds=library.speeds[few],
-        turn_rates=library.turn_rates[few],
-    )
+    columns = "trims", "twists", "rates", "periods", "speeds", "turn_rates"
+    return replace(library, **{name: getattr(library, name)[few] for name in columns})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -234,7 +227,6 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
     limit, library = problem.horizon.time, setup.library
     pads = limit is not None and library.rest is not None
     kept = columns(library, pads=pads, free_heading=setup.free_heading)
-    n_priced = len(kept.trims) - int(setup.free_heading)
     met = [(kept.twists[:, 3], setup.goal[3])] if setup.climbs else []
     met += [] if limit is None else [(kept.weights, limit)]
     return InsertionLibrary(
@@ -250,7 +242,7 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
         rest=len(library.trims) if pads else None,
         tail=int(setup.free_heading),
         climbs=setup.climbs,
-        n_priced=n_priced,
+        n_priced=len(kept.trims) - int(setup.free_heading),
         fixed_cost=library.rest_rate * limit if pads and limit is not None else 0.0,
         scale=kept.scale,
     )

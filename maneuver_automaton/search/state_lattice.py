@@ -69,10 +69,8 @@ class Graph:
         half = 0.5 * (window[2:4] - window[:2])
         window[:2] -= half
         window[2:4] += half
-        coarse, fine = (
-            one._replace(scene=one.scene._replace(edge_window=window))
-            for one in (self.coarse, self.fine)
-        )
+        coarse = self.coarse._replace(scene=self.coarse.scene._replace(edge_window=window))
+        fine = self.fine._replace(scene=self.fine.scene._replace(edge_window=window))
         return replace(self, coarse=coarse, fine=fine)
 
     def backwards(self) -> Graph | None:
@@ -120,11 +118,7 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
     cost = terms_of(problem.cost)
     if cost is None or problem.automaton.body_velocities.any():
         return None
-    named, index = [], []
-    for k in goals:
-        for goal in at_headings(problem, problem.goals[k]):
-            named.append(goal)
-            index.append(k)
+    named = [goal for k in goals for goal in at_headings(problem, problem.goals[k])]
     if not named:
         return None
     there = problem.starting_at(problem.start, time=problem.start_time, goals=named)
@@ -139,11 +133,9 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
     world = SE2(problem.start) @ SE2(np.array([0.0, 0.0, turn - float(query.start[2])]))
     aims = _aims(problem, goals, world, lattice, slope)
     x, y = query.start[:2].tolist()
-    lattice = lattice._replace(
-        frame=(x, y, turn, math.cos(turn), math.sin(turn)), roots=np.array([[0, 0, begun]])
-    )
-    margin = min(MARGIN, query.margin)
-    scene = for_library(query.scene(margin), problem, fine)
+    frame = x, y, turn, math.cos(turn), math.sin(turn)
+    lattice = lattice._replace(frame=frame, roots=np.array([[0, 0, begun]]))
+    scene = for_library(query.scene(min(MARGIN, query.margin)), problem, fine)
     return Graph(
         query=query,
         lattice=lattice,
@@ -189,9 +181,8 @@ def _states(
                 after = {1: 1, -1: 2}[int(signs[-1])]
             turns = bool(len(signs) and before and before != signs[0])
             paid = float(arrays.edges.cost[e]) + cost.direction_change * turns
-            rows.append(
-                (int(source[e]) * directed + gear, int(target[e]) * directed + after, e, paid)
-            )
+            ends_in = int(target[e]) * directed + after
+            rows.append((int(source[e]) * directed + gear, ends_in, e, paid))
     rows.sort(key=lambda row: row[:1])
     begins, targets, edges = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
     first, _ = _by_state(begins, directed * len(heading))

@@ -86,10 +86,8 @@ class WordScan:
         self.spare = spare
         self.slack = slack
         self.tables = tables(setup.library, free_heading=setup.free_heading)
-        rows = (
-            [] if not_first is None else np.flatnonzero(setup.library.trims == not_first).tolist()
-        )
-        self.not_first = rows[0] if rows else -1  # a row of the search
+        trims = setup.library.trims.tolist()
+        self.not_first = trims.index(not_first) if not_first in trims else -1  # a row of the search
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = terms_of(problem.cost) is None
         if self.own_prices:
@@ -180,8 +178,7 @@ class WordScan:
         if self.most + tail > MOST_TRIMS:
             return False
         each = SECONDS_PER_WORD if mode.kernel_problem[0].library.targets.size else SECONDS_IF_FREE
-        most = min(self.most, mode.most_moving)
-        numbers = range(1, most + 1)
+        numbers = range(1, min(self.most, mode.most_moving) + 1)
         seconds = math.fsum(len(self.setup.library.trims) ** n * each[n + tail] for n in numbers)
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
 
@@ -228,16 +225,12 @@ class WordScan:
         longest = MOST_TRIMS - int(setup.free_heading)
         exact = horizon.time if horizon.time is not None else horizon.max_time
         if horizon.time is None:
-            yield Mode(
-                self._kernel_problem(horizon.max_time, pad=False, fixed=False),
-                min(self.most, longest),
-            )
+            kernel_problem = self._kernel_problem(horizon.max_time, pad=False, fixed=False)
+            yield Mode(kernel_problem, min(self.most, longest))
         elif setup.library.rest is not None:
             # of `max_trims`, rest is one, unless the rest of the time happens to be none
-            yield Mode(
-                self._kernel_problem(horizon.time, pad=True, fixed=False),
-                min(self.most - 1, longest),
-            )
+            kernel_problem = self._kernel_problem(horizon.time, pad=True, fixed=False)
+            yield Mode(kernel_problem, min(self.most - 1, longest))
         if exact is not None:
             most = min(self.most, 2 if self.spare else longest)
             at_least = exact * self.tables.least_rate if len(setup.library.rates) else math.inf
@@ -374,13 +367,8 @@ def _same_for_all(
 ) -> _SameForAll:
     """Trims above a rest of this rate, linear conditions, transitions; kernels only read them."""
     rates, per_unit = _rates_above(tables, rest_rate)
-    rows, gains = [], []
-    if climbs:
-        rows.append(tables.columns.twists[:, 3])
-        gains.append(known.displacement[..., 3])
-    if fixed:
-        rows.append(tables.columns.weights)
-        gains.append(known.time)
+    met = [(tables.columns.twists[:, 3], known.displacement[..., 3])] if climbs else []
+    met += [(tables.columns.weights, known.time)] if fixed else []
     links = Links(
         class_of=known.class_of[tables.columns.trims],
         start=start,
@@ -388,14 +376,14 @@ def _same_for_all(
         displacement=np.array(known.displacement),
         cost=known.cost - rest_rate * known.time if rest_rate else np.array(known.cost),
         time=np.array(known.time),
-        gains=np.array(gains).reshape(len(gains), *known.time.shape),
+        gains=np.array([gain for _, gain in met]).reshape(len(met), *known.time.shape),
     )
     return _SameForAll(
         trims=np.arange(len(rates)),
         size=np.zeros(1, dtype=np.int64),
         rates=rates,
         per_unit=per_unit,
-        rows=np.array(rows).reshape(len(rows), len(rates)),
+        rows=np.array([row for row, _ in met]).reshape(len(met), len(rates)),
         links=links,
     )
 

@@ -86,9 +86,8 @@ class WordSetup:
         """Arrays for an exhaustive search: the alphabet, and the transitions within it."""
         rows, arrays, problem = list(self.alphabet), self.library.arrays, self.problem
         known, relative = self.library.transitions, goal_from_start(problem, self.goal)
-        waiting = _waiting_rate(problem)
-        climbs = arrays.twists[rows, 3].any() or known.displacement[..., 3].any()
-        twists = arrays.twists[rows]
+        twists, waiting = arrays.twists[rows], _waiting_rate(problem)
+        climbs = twists[:, 3].any() or known.displacement[..., 3].any()
         library = MovingTrims(
             trims=np.array(rows, dtype=np.int64),
             twists=twists,
@@ -146,15 +145,8 @@ class WordSetup:
         if not len(trims):
             return self._without_trims()
         twists, steps = self._rows(trims)
-        begin = self._begin(trims)
-        closed = closed_at(
-            begin,
-            twists,
-            times,
-            self.goal.pose,
-            displacements=steps,
-            free_heading=self.goal.free_heading,
-        )
+        begin, end, free = self._begin(trims), self.goal.pose, self.goal.free_heading
+        closed = closed_at(begin, twists, times, end, displacements=steps, free_heading=free)
         if self._is_late(float(closed.sum()) + self.fixed(trims)[1]):
             return None
         return None if self.exactly else self.priced(trims, closed)
@@ -229,8 +221,7 @@ class WordSetup:
             return None
         twists, steps = self._rows(trims)
         begin, group = group_of(self.goal.pose.size)(self._begin(trims)), self.group
-        rows = list(trims)
-        arrays = self.library.arrays
+        rows, arrays = list(trims), self.library.arrays
         solved = solve_switching_times(
             twists,
             arrays.rates[rows],
@@ -262,11 +253,10 @@ class WordSetup:
         group, dof = self.group, self.problem.start.size
         (over,) = self.library.displacements([self.start_trim, self.goal_trim])
         end = np.array((group(self.problem.start) @ group(over[:dof])).pose)
-        if max(self.goal.off(end)) > self.library.arrays.rounding.met or self._is_late(
-            self.fixed(())[1]
-        ):
+        misses = max(self.goal.off(end)) > self.library.arrays.rounding.met
+        if misses or self.exactly or self._is_late(self.fixed(())[1]):
             return None
-        return None if self.exactly else self.priced((), np.zeros(0))
+        return self.priced((), np.zeros(0))
 
     def _is_late(self, duration: float) -> bool:
         return self.limit is not None and duration > self.limit * (1.0 + LATE)
@@ -308,16 +298,12 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
     terms = terms_of(cost)
     if terms is None or not prices_switches(cost):
         return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
-    alone = [
-        Plan(
-            still,
-            (automaton[one.source], automaton[one.target]),
-            durations=[0.0, 0.0],
-            maneuvers=(one,),
-        )
-        for one in automaton.maneuvers
-    ]
-    return np.array([any_problem.invariant_cost_of(one) for one in alone]) + terms.switch
+    costs = list[float]()
+    for one in automaton.maneuvers:
+        ends = automaton[one.source], automaton[one.target]
+        alone = Plan(still, ends, durations=[0.0, 0.0], maneuvers=(one,))
+        costs.append(any_problem.invariant_cost_of(alone))
+    return np.array(costs) + terms.switch
 
 
 @kept_by_first
@@ -351,8 +337,8 @@ def _transitions(automaton: Automaton, cost: StageCost, waiting: float) -> Libra
     rates = cost.rates(automaton.controls, automaton.body_velocities)
     prices = maneuver_prices(automaton, cost)
     lasting = np.array([maneuver.duration for maneuver in automaton.maneuvers])
-    rates = np.maximum(rates - waiting, 0.0)
     prices = np.maximum(prices - waiting * lasting, 0.0)
+    rates = np.maximum(rates - waiting, 0.0)
     return library_of(automaton, rates=rates, maneuver_costs=prices, trims=())
 
 
@@ -379,10 +365,8 @@ def _without_idle(
         or (k > 0 and transitions[k - 1] != SWITCH)
         or (k < len(transitions) and transitions[k] != SWITCH)
     ] or [0]
-    links = [
-        transitions[a] if b == a + 1 else SWITCH  # what was left out had switches on either side
-        for a, b in pairwise(kept)
-    ]
+    # what was left out had switches on either side
+    links = [transitions[a] if b == a + 1 else SWITCH for a, b in pairwise(kept)]
     return Word(
         trims=np.array([trims[k] for k in kept]),
         durations=np.array([durations[k] for k in kept]),

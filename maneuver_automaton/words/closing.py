@@ -134,9 +134,8 @@ def times_through(
     """As `closest_times`, for words whose beginnings meet conditions too: each of its twists."""
     n, now, best, least = len(durations), durations, durations, math.inf
     for _ in range(STEPS):
-        gaps, columns = zip(
-            *(one.missing(now[: len(one.twists)]) for one in conditions), strict=True
-        )
+        missed = (one.missing(now[: len(one.twists)]) for one in conditions)
+        gaps, columns = zip(*missed, strict=True)
         gap = np.concatenate(gaps)
         worst = float(np.abs(gap).max())
         if worst < least:
@@ -231,9 +230,8 @@ def steer(
     """
     rows = _shaped("twists", twists, (3, 3))
     end = _shaped("goal", goal, (3,))
-    steps = _shaped(
-        "displacements", np.zeros((2, 3)) if displacements is None else displacements, (2, 3)
-    )
+    given = np.zeros((2, 3)) if displacements is None else displacements
+    steps = _shaped("displacements", given, (2, 3))
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise ValueError(f"tolerance: got {tolerance}, need a positive number")
     branches = kernels.steer_batch(

@@ -213,12 +213,9 @@ class _ConjugatedWord:
         near[2] = math.remainder(float(near[2]), 2.0 * math.pi)
         if not float(np.abs(near).max()) < MET or (beyond is not None and beyond > MET):
             return _failed(len(rates))
-        return SwitchingTimes(
-            status=TimesStatus.OPTIMAL,
-            durations=self.floors.copy(),
-            cost=float(rates @ self.floors),
-            multipliers=np.zeros(3),
-        )
+        cost, durations = float(rates @ self.floors), self.floors.copy()
+        known = _failed(len(rates))
+        return replace(known, status=TimesStatus.OPTIMAL, durations=durations, cost=cost)
 
 
 def _solved(
@@ -235,21 +232,16 @@ def _solved(
     words, end = np.zeros((n, 4)), np.zeros(4)
     words[:, : twists.shape[1]] = twists
     end[: goal.size] = goal
-    rows, targets = [], []
-    if words[:, 3].any() or end[3] != 0.0:
-        rows.append(words[:, 3])
-        targets.append(end[3])
-    if total is not None:
-        rows.append(weights)
-        targets.append(total)
+    met = [(words[:, 3], float(end[3]))] if words[:, 3].any() or end[3] != 0.0 else []
+    met += [] if total is None else [(weights, total)]
     times = np.zeros(n)
     status, cost, multipliers, _slope = kernels.solve_times(
         TimesProblem(
             twists=words,
             rates=np.ascontiguousarray(rates),
-            rows=np.array(rows).reshape(len(rows), n),
+            rows=np.array([row for row, _ in met]).reshape(len(met), n),
             goal=end,
-            targets=np.array(targets, dtype=np.float64),
+            targets=np.array([target for _, target in met], dtype=np.float64),
         ),
         _starts(n, total, guesses, restarts),
         times,
