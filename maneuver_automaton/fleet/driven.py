@@ -18,6 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
@@ -244,16 +245,12 @@ class _DrivenBody:
 
     def solids(self, poses: Array) -> Any:
         """It at poses (n, 3), for shapely."""
-        import shapely
-
         corners = SE2(poses[:, None]).act(self.ring)
         return shapely.points(corners[:, 0]) if len(self.ring) == 1 else shapely.polygons(corners)
 
 
 def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
     """Outer corners (n, 2) of each shape, and by how much it is larger [m]; holes are filled."""
-    import shapely
-
     if not shapes:
         yield np.zeros((1, 2)), 0.0
     for shape in shapes:
@@ -320,8 +317,6 @@ def _apart(
     one: _DrivenBody, other: _DrivenBody, times: Array, steps: Array, enough: float
 ) -> Array:
     """Distance (n,) of two bodies at times (n,) [s]; a lower bound where it is enough."""
-    import shapely
-
     first, second = one.poses_at(times, steps), other.poses_at(times, steps)
     apart = np.hypot(*(first - second)[:, :2].T) - one.reach - other.reach
     near = apart < enough

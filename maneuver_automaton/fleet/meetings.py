@@ -11,6 +11,7 @@ import networkx as nx
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision.body import Body, body_of, fastest_points
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.world import world_of
@@ -217,8 +218,6 @@ def near_pairs(
     """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m]."""
     if len(discs) < 2:
         return []
-    import shapely
-
     owners = [owner for owner, *_ in discs]
     rows = np.array([row for _, *row in discs])
     index = shapely.STRtree(shapely.points(rows[:, :2]))

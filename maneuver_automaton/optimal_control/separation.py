@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.optimal_control.polish_program import PolishProgram
 from maneuver_automaton.optimal_control.scene import ALWAYS, Point, Solid
 
@@ -69,8 +70,6 @@ class Lines(NamedTuple):
 
 def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPairs:
     """Pairs that are nearer than `within` [m] at a point, from control points in numbers."""
-    import shapely
-
     pieces, body = program.pieces(point), program.scene.body
     if not (pieces.solids and body):
         empty = np.zeros(0, dtype=np.int64)
@@ -98,8 +97,6 @@ def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPair
 
 def first_lines(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
     """Lines midway between nearest points; of solids that overlap, along the least penetration."""
-    import shapely
-
     if not len(pairs.piece):
         return Lines(np.zeros(0), np.zeros((0, 2)))
     pieces = program.pieces(point).solids
@@ -258,8 +255,6 @@ def facing(
 
 def _geometries(rings: Sequence[Array]) -> Any:
     """Hulls (n,) of corners in any order: points, edges and polygons, of as many at once."""
-    import shapely
-
     counts = np.array([len(ring) for ring in rings])
     found = np.empty(len(rings), dtype=object)
     for count in np.unique(counts).tolist():
@@ -273,8 +268,6 @@ def _geometries(rings: Sequence[Array]) -> Any:
 
 
 def _hulls(x: Array, y: Array) -> Any:
-    import shapely
-
     return shapely.convex_hull(shapely.linestrings(np.stack([x.T, y.T], axis=-1)))
 
 

@@ -19,6 +19,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Actor, Cast, rings_with_radius
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
@@ -89,8 +90,6 @@ def _nearest(
     rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers, heights: Array
 ) -> Array:
     """Distance (parts, n) of each part from the nearest part of another vehicle."""
-    import shapely
-
     middles, radii, placed = [], [], []
     for ring, grown, poses in rows:
         middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))

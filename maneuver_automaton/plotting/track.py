@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Polygon, Shape
 from maneuver_automaton.collision.convex import convex_pieces
@@ -333,8 +334,6 @@ def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
 
 def solids_at(outline: Array, poses: Array) -> Any:
     """Shapely geometries (n,) of an outline, or of a point, at `poses` (n, dof) in the plane."""
-    import shapely
-
     corners = SE2(poses[:, None, :3]).act(outline)
     return shapely.points(corners[:, 0]) if len(outline) == 1 else shapely.polygons(corners)
 
@@ -349,8 +348,6 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
     body is taken to fill the hull of its two places: on a circle of radius r that is off by
     ``r * angle**2 / 8``, a millimetre for a car.
     """
-    import shapely
-
     pieces = [corners for outline in outlines for corners, _ in convex_pieces(Polygon(outline))]
     parts: list[Any] = []
     for corners in pieces:
@@ -364,8 +361,6 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
 
 def merged(parts: Sequence[Any]) -> list[Any]:
     """Shapely polygons that cover what the `parts` cover, each place once."""
-    import shapely
-
     whole = shapely.union_all(np.array(parts))
     return [part for part in shapely.get_parts(whole).tolist() if part.geom_type == "Polygon"]
 

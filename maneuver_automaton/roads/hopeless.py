@@ -15,6 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import RECENT
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Shape
 from maneuver_automaton.collision.outline import united
@@ -44,8 +45,6 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
 
     `there` is the start, a plan of no duration.
     """
-    import shapely
-
     causes = [(one, f"{said} at the start") for one, said in judged(scene, vehicle, there).faults]
     speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
     if (beyond := max(low - speed, speed - high)) > EXACT:
@@ -64,8 +63,6 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
 
 def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]:
     """Distances [m] of the body at the start: to the edge of the road, to the nearest road user."""
-    import shapely
-
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     body, now = _bodies(scene.start.middle[None], size), scene.start.time
     present = [(one, *presence_of(one)) for one in scene.traffic]
@@ -84,8 +81,6 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
 
     The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
     """
-    import shapely
-
     model, start = vehicle.model, scene.start
     lasts = goal.time[1] - start.time
     if lasts < -EXACT:
@@ -118,8 +113,6 @@ def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, mo
     Before its heading is across that of the start, its rear axle has moved aside by its least
     radius, and ahead of that is its front. Without it, the rear axle is never behind where it was.
     """
-    import shapely
-
     back = max(vehicle.ahead, 0.0)
     corners = np.array([[-back, -FAR], [FAR, -FAR], [FAR, FAR], [-back, FAR]])
     away = goal.away_from(shapely.Polygon(SE2(middle).act(corners)))
@@ -144,8 +137,6 @@ def _may_fit(
     Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
     box have in common of the body is not on the road, in each of them.
     """
-    import shapely
-
     shapely.prepare(road)
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     corners = np.concatenate(outlines_of(places))
@@ -172,8 +163,6 @@ def _may_fit(
 
 def _away(places: Sequence[Shape] | None, points: Any) -> Array:
     """Distances of shapely geometries (n,) to the nearest of some places; zeros for any place."""
-    import shapely
-
     apart = [
         shapely.distance(geometry_of(one), points) - (one.radius if isinstance(one, Disc) else 0.0)
         for one in places or ()
@@ -183,16 +172,12 @@ def _away(places: Sequence[Shape] | None, points: Any) -> Array:
 
 def _bodies(middles: Array, size: Array) -> Any:
     """Rectangles at poses (n, 3); half their length and width (2,)."""
-    import shapely
-
     corners = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     return shapely.polygons(np.asarray(SE2(middles[:, None]).act(corners)))
 
 
 def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
     """Who keeps the middle of a vehicle from each goal, in words; empty where nobody does."""
-    import shapely
-
     walls: dict[str, list[Wall]] = {}
     for one in scene.traffic:
         if one.motion is None or not np.ptp(one.motion.pose, axis=0).any():
@@ -233,8 +218,6 @@ def _met(
     From one time at which a wall comes or goes to the next, it stays in a connected part of what
     they leave of the road, and gets no further than the top speed allows.
     """
-    import shapely
-
     begin, last = scene.start.time, scene.last_time
     every = [one for some in walls.values() for one in some]
     times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.roads.lanelets import ROUNDED, Lanelet, along, drivable_area
 from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -108,8 +109,6 @@ def hindrance(route: Route, scene: RoadScene, vehicle: RoadVehicle) -> str:
 
 def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | None:
     """How far the road goes on to the left and to the right of a point of a route [m]."""
-    import shapely
-
     point, aside = route.points[k], np.array([-np.sin(route.heading[k]), np.cos(route.heading[k])])
     reach = ASIDE * COLUMNS * aside
     line = shapely.LineString([point - reach, point + reach])
@@ -124,8 +123,6 @@ def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | Non
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
     """Numbers of the lanelets around a pose (3,) with its direction; else of the nearest."""
-    import shapely
-
     place = shapely.Point(middle[:2])
     forward = np.array([np.cos(middle[2]), np.sin(middle[2])])
     off = {}
@@ -142,8 +139,6 @@ def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
 
 def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]:
     """Numbers of the lanelets that a goal covers, or that cover it, by a good part."""
-    import shapely
-
     if goal.lanelets:
         return list(goal.lanelets)
     found = []
@@ -247,8 +242,6 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
 
 def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array) -> Array:
     """`Route.limit`: of lanelets that overlap the greatest holds."""
-    import shapely
-
     offsets = ASIDE * np.arange(-COLUMNS, COLUMNS + 1)
     limit = np.full((len(points), len(offsets)), -np.inf)
     if all(one.speed_limit is None for one in lanelets):
@@ -285,8 +278,6 @@ def extent_on(rings: Sequence[Array], route: Route) -> Array:
 
 
 def _extent(rings: Sequence[Array], points: Array, heading: Array) -> Array:
-    import shapely
-
     if (around := sum(shapely.LinearRing(ring).length for ring in rings)) > LONGEST:
         raise ValueError(f"goal: its outline is {around:.3g} m long, need at most {LONGEST:g} m")
     corners = np.concatenate(
