@@ -278,5 +278,4 @@ def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
         return np.array([0.0, maneuver.duration]), np.abs(maneuver.displacement[None])
     changes = (course.control[1:-1] != course.control[:-2]).any(axis=1)
     rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
-    steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
-    return course.time[rows], steps
+    return course.time[rows], np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])

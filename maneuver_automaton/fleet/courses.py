@@ -240,5 +240,4 @@ def larger(shape: Shape, by: float) -> Shape:
         return Disc(shape.radius + by, shape.center)
     if isinstance(shape, Box):
         return Box(shape.size + 2.0 * by, shape.center, shape.heading)
-    whole = shapely.Polygon(shape.corners, shape.holes).buffer(by, join_style="mitre")
-    return Polygon(whole)
+    return Polygon(shapely.Polygon(shape.corners, shape.holes).buffer(by, join_style="mitre"))

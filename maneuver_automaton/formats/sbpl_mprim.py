@@ -109,8 +109,7 @@ class _Words:
         return self
 
     def finite(self, what: str) -> float:
-        word = self.next(what)
-        return finite(word, at=f"{self.path}:{self.line}: {what.rstrip(':')}")
+        return finite(self.next(what), at=f"{self.path}:{self.line}: {what.rstrip(':')}")
 
     def positive(self, what: str) -> float:
         value = self.finite(what)

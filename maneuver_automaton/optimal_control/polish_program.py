@@ -69,8 +69,7 @@ def paths(
             x_1, y_1, v_1, w_1 = _corners(casadi, part, corners, end)
             third = casadi.repmat(step / 3.0, len(corners), 1)
             x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
-            y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
-            found.append(Paths(x, y))
+            found.append(Paths(x, casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)))
     return found
 
 
@@ -228,8 +227,7 @@ def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Block
     blocks = []
     for guard, which in zip(program.scene.guards, held, strict=False):
         if len(which):
-            limits = guard._replace(solids=None)
-            given = (program.model, limits, weight, program.paced)
+            given = (program.model, guard._replace(solids=None), weight, program.paced)
             kind = _guard_kind(*given)  # type: ignore[arg-type]  # values all
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
@@ -485,12 +483,11 @@ def _frames(casadi: Any, model: Model, state: Any, control: Any) -> NodeMotion:
     dof = model.group.dof
     z, u = casadi.vertsplit(state[dof:, :]), casadi.vertsplit(control)
     ones = casadi.SX.ones(1, state.shape[1])
-    rates = [casadi.SX(rate) * ones for rate in model.dynamics(z, u)]
     return NodeMotion(
         pose=state[:dof, :],
         twist=[casadi.SX(v) * ones for v in model.velocity(z, u)],
         reduced=state[dof:, :],
-        reduced_rates=casadi.vertcat(*rates),
+        reduced_rates=casadi.vertcat(*[casadi.SX(rate) * ones for rate in model.dynamics(z, u)]),
     )
 
 
@@ -502,5 +499,4 @@ def _ends_in_rates(model: Model) -> list[int]:
     with numpy_on_symbols(casadi):
         velocity = model.velocity(casadi.vertsplit(z), casadi.vertsplit(u))
     twist = casadi.vertcat(*(casadi.SX(v) for v in velocity))
-    depends = casadi.which_depends(twist, u, 1, False)
-    return [k for k, used in enumerate(depends) if not used]
+    return [k for k, used in enumerate(casadi.which_depends(twist, u, 1, False)) if not used]

@@ -82,8 +82,7 @@ def evaluate(
         count = x.shape[1]
         xs, us = list(x), list(u)
         rates = [*problem.dynamics(xs, us), *(integrand(xs, us) for integrand in integrands)]
-        rows = [np.broadcast_to(row, (count,)) for row in rates]
-        return np.array(rows, dtype=np.float64)
+        return np.array([np.broadcast_to(row, (count,)) for row in rates], dtype=np.float64)
 
     inputs = np.repeat(control, grid.held, axis=0).T
     step = duration / (grid.n_nodes - 1)
@@ -194,7 +193,6 @@ def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
             objective += casadi.sum2(added[n_states:, :])
         if problem.terminal_cost is not None:
             objective += problem.terminal_cost(casadi.vertsplit(state[:, n - 1]))
-    defects = casadi.vec(state[:, : n - 1] + added[:n_states, :] - state[:, 1:])
     return Transcription(
         problem=problem,
         grid=grid,
@@ -203,7 +201,7 @@ def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
         duration=duration,
         objective=objective,
         inputs=inputs,
-        constraints=defects,
+        constraints=casadi.vec(state[:, : n - 1] + added[:n_states, :] - state[:, 1:]),
         limits=np.zeros((n_states * (n - 1), 2)),
         bounds=bounds_of(problem, grid),
     )
@@ -313,8 +311,7 @@ def unpacked(
     """States (n, n_x), controls (m, n_u) and duration from the values of all variables."""
     split = grid.n_nodes * problem.n_states
     state = values[:split].reshape(grid.n_nodes, problem.n_states)
-    control = values[split:-1].reshape(grid.n_controls, problem.n_controls)
-    return state, control, float(values[-1])
+    return state, values[split:-1].reshape(grid.n_controls, problem.n_controls), float(values[-1])
 
 
 def bounds_of(problem: OptimalControlProblem, grid: TimeGrid) -> Array:

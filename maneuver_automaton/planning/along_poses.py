@@ -160,8 +160,7 @@ class _Legs:
     def is_timed(self) -> bool:
         """Whether a leg depends on what was driven before it."""
         horizon = self.between.horizon
-        limited = horizon.max_time is not None or horizon.max_trims is not None
-        return self.between.moves or limited
+        return self.between.moves or horizon.max_time is not None or horizon.max_trims is not None
 
     def is_over(self, budget: Budget) -> bool:
         """Whether no leg may be planned any more."""
@@ -431,8 +430,7 @@ class _Search:
     def _offer(self, chain: Chain) -> bool:
         """Offer a whole chain; whether it passes the checks."""
         assert chain.goal_index is not None
-        passed = self.found.may_check and self.found.offer(chain.plan, chain.goal_index)
-        if passed:
+        if self.found.may_check and self.found.offer(chain.plan, chain.goal_index):
             return True
         again = self._from_its_ends(chain)
         return again is not None and self.found.offer(again, chain.goal_index)

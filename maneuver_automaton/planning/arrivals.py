@@ -98,8 +98,7 @@ def arrivals_of(
         proven = len(found) == 1 and not via.radius
         status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
         return (), (status, _about(blocked[0]))
-    free = (one for one, why in zip(found, blocked, strict=True) if not why)
-    return tuple(free), None
+    return tuple(one for one, why in zip(found, blocked, strict=True) if not why), None
 
 
 def _about(said: str) -> str:
@@ -303,8 +302,7 @@ class LegCosts:
             self.car = shortest_trims(problem.automaton, problem.cost)
             self.are_least = len(library.twists) <= MOST_LETTERS and three_are_enough(problem)
             few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
-            spin = np.array([[0.0, 0.0, 1.0]])
-            self.twists = np.vstack([library.twists[few][:, :3], spin])
+            self.twists = np.vstack([library.twists[few][:, :3], [[0.0, 0.0, 1.0]]])
             self.rates = library.rates[few]
             letters = range(len(few))
             self.words = np.array(list(itertools.product(letters, repeat=3)), dtype=np.int64)
@@ -416,7 +414,6 @@ class BetterArrivals:
     def _through(self, chain: list[Array], k: int, poses: Array) -> Array:
         """What both legs beside an arrival cost, for poses (m, 3) in its place."""
         before = self._around(chain, k)[0][None]
-        last = k + 1 == len(chain)
-        ends = list(self.problem.goals) if last else [Goal(chain[k + 1])]
+        ends = list(self.problem.goals) if k + 1 == len(chain) else [Goal(chain[k + 1])]
         onward = self.costs.to(poses, ends).min(axis=1)
         return np.asarray(self.costs.between(before, poses)[0] + onward)

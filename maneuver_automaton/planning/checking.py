@@ -110,7 +110,6 @@ def check_plan(
             whole=problem.cost_of(plan) if prices else 0.0,
         )
         arrived = goal if problem.automaton.lattice is None else replace(goal, pose=plan.end)
-        ends = problem.first_trim.reduced_state, problem.last_trim(arrived).reduced_state
         audit = audit_plan(
             plan,
             goal,
@@ -120,7 +119,7 @@ def check_plan(
             obstacles=problem.obstacles,
             body_height=problem.body_height,
             margin=problem.margin,
-            states=ends,
+            states=(problem.first_trim.reduced_state, problem.last_trim(arrived).reduced_state),
             zones=problem.zones,
             places=places,
             via=problem.via,

@@ -123,8 +123,7 @@ class FromState(PlanningStep):
 def _offer_whole(found: Incumbents, one: BetweenTrims, plan: Plan) -> None:
     """Offer a plan between trims, with its first and last maneuver."""
     asked = found.problem
-    off = [sum(goal.off(plan.end)) for goal in one.problem.goals]
-    place = int(np.argmin(off))
+    place = int(np.argmin([sum(goal.off(plan.end)) for goal in one.problem.goals]))
     last = one.last[place]
     whole = plan
     if one.first is not None:
@@ -236,10 +235,9 @@ def _before(goal: Goal, leg: Leg) -> Iterator[Goal]:
     for turn in np.arange(HEADINGS if goal.free_heading else 1) * (2.0 * math.pi / HEADINGS):
         end = goal.pose.copy()
         end[2] += turn
-        pose = (group(end) @ group(leg.maneuver.displacement).inverse()).pose
         yield replace(
             goal,
-            pose=pose,
+            pose=(group(end) @ group(leg.maneuver.displacement).inverse()).pose,
             trim=leg.trim.name,
             state=None,
             free_heading=False,
@@ -291,8 +289,7 @@ def _legs(problem: Problem, state: Trim, *, ends: bool) -> Iterator[Leg]:
     rest = [k for k in order if every[k].is_rest][:1]
     near = [every[k] for k in dict.fromkeys([*order[:NEAREST], *rest])]
     pairs = [(trim, state) if ends else (state, trim) for trim in near]
-    made = all_maneuvers_between(automaton.model, pairs)
-    for trim, maneuvers in zip(near, made, strict=True):
+    for trim, maneuvers in zip(near, all_maneuvers_between(automaton.model, pairs), strict=True):
         for maneuver in maneuvers:
             yield Leg(maneuver, state, trim)
 

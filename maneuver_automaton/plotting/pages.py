@@ -282,11 +282,10 @@ def _png(figure: Figure) -> bytes:
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]
     (high, wide), dots = pixels.shape[:2], round(figure.dpi / 0.0254)  # of a meter
-    rows = np.pad(pixels.reshape(high, -1), ((0, 0), (1, 0)))
     parts = {
         b"IHDR": struct.pack(">IIBBBBB", wide, high, 8, 2, 0, 0, 0),
         b"pHYs": struct.pack(">IIB", dots, dots, 1),
-        b"IDAT": zlib.compress(rows.tobytes(), 2),
+        b"IDAT": zlib.compress(np.pad(pixels.reshape(high, -1), ((0, 0), (1, 0))).tobytes(), 2),
         b"IEND": b"",
     }
     return b"\x89PNG\r\n\x1a\n" + b"".join(

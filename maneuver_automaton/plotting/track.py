@@ -129,8 +129,7 @@ class Track:
         for piece in self.pieces:
             low, high = max(begin, float(piece.time[0])), min(end, float(piece.time[-1]))
             if low < high:
-                inside = piece.time[(piece.time > low) & (piece.time < high)]
-                at = np.array([low, *inside, high])
+                at = np.array([low, *piece.time[(piece.time > low) & (piece.time < high)], high])
                 places = [np.interp(at, piece.time, column) for column in piece.pose.T[:2]]
                 parts.append((piece.name, np.stack(places, axis=-1)))
         return parts
@@ -262,12 +261,10 @@ def _runs(samples: _Samples) -> list[_Run]:
     heading = samples.pose[:-1, 2]
     ahead = np.cos(heading) * steps[:, 0] + np.sin(heading) * steps[:, 1]
     driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
-    changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
-    cuts = [int(driven[k + 1]) for k in changes]
+    cuts = [int(driven[k + 1]) for k in np.flatnonzero(np.diff(np.sign(ahead[driven])))]
     bounds = [0, *cuts, len(samples.time) - 1]
     runs = [run for first, last in pairwise(bounds) for run in _turns(samples, first, last)]
-    sides = {run.turn for run in runs}
-    return runs if cuts or {-1, 1} <= sides else runs[:1]
+    return runs if cuts or {-1, 1} <= {run.turn for run in runs} else runs[:1]
 
 
 def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
@@ -291,8 +288,7 @@ def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
     while len(runs) > 1 and min(map(weight, runs)) < 1.0:
         k = min(range(len(runs)), key=lambda n: weight(runs[n]))
         beside = [n for n in (k - 1, k + 1) if 0 <= n < len(runs)]
-        into = max(beside, key=lambda n: weight(runs[n]))
-        runs[k] = runs[k]._replace(turn=runs[into].turn)
+        runs[k] = runs[k]._replace(turn=runs[max(beside, key=lambda n: weight(runs[n]))].turn)
         runs = _joined(runs)
     if len(runs) == 1 and weight(runs[0]) < 1.0:
         return [runs[0]._replace(turn=0)]
@@ -310,8 +306,7 @@ def _joined(runs: Sequence[_Run]) -> list[_Run]:
 def _twist(time: Array, pose: Array) -> Array:
     """Mean twist (dof,) of one piece: what it gains from sample to sample, over its duration."""
     gained = (SE2(pose[:-1, :3]).inverse() @ SE2(pose[1:, :3])).log().sum(axis=0)
-    climbed = pose[-1, 3:] - pose[0, 3:]
-    return np.asarray(np.concatenate([gained, climbed]) / (time[-1] - time[0]))
+    return np.asarray(np.concatenate([gained, pose[-1, 3:] - pose[0, 3:]]) / (time[-1] - time[0]))
 
 
 DISC_CORNERS = 48
@@ -351,8 +346,7 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
     pieces = [corners for outline in outlines for corners, _ in convex_pieces(Polygon(outline))]
     parts: list[Any] = []
     for corners in pieces:
-        at = [track.start[None], *(_samples(piece) for piece in track.pieces)]
-        for poses in at:
+        for poses in [track.start[None], *(_samples(piece) for piece in track.pieces)]:
             places = np.array(placed([corners], poses))
             pairs = np.concatenate([places[:-1], places[1:]], axis=1) if len(places) > 1 else places
             parts += shapely.convex_hull(shapely.multipoints(pairs)).tolist()

@@ -241,8 +241,7 @@ class LoopBounds:
         known = self.known(here, accumulated)
         if value == math.inf or value - known <= self.gap * value or budget.is_over:
             return known
-        watch = Watch(gap=self.gap, cost=value, bound=known)
-        proving = Proving(here, budget, watch)
+        proving = Proving(here, budget, Watch(gap=self.gap, cost=value, bound=known))
         proving.run()
         for function in proving.functions:
             if function.whole:

@@ -151,8 +151,7 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
     )
     if not bracket:
         return True
-    scale = max(map(abs, one)) * max(map(abs, other))
-    return bool(bracket <= 1e-12 * scale)
+    return bool(bracket <= 1e-12 * (max(map(abs, one)) * max(map(abs, other))))
 
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
@@ -188,8 +187,7 @@ def reanchored(
         pose = np.array(goal.pose)
         pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
         pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
-        eased = replace(goal, pose=pose)
-        near = same_word(problem, plan, eased, pad=pad, under_way=under_way)
+        near = same_word(problem, plan, replace(goal, pose=pose), pad=pad, under_way=under_way)
         if near is not None:
             yield near
 

@@ -110,8 +110,7 @@ class Situation:
             measured = trim_at(model, state, "measured state")
             if measured.is_rest and not model.reduced_dynamics(state, measured.control).any():
                 return
-            trims = last.plan.trims or (here.last_trim(here.goals[last.goal_index]),)
-            trim = trims[-1]
+            trim = (last.plan.trims or (here.last_trim(here.goals[last.goal_index]),))[-1]
             expected = trim.reduced_state
             after = Plan(here.start, (trim,), durations=[0.0], start_time=here.start_time)
         off = float(np.abs(expected - state).max())

@@ -65,10 +65,9 @@ def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]
     """Distances [m] of the body at the start: to the edge of the road, to the nearest road user."""
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     body, now = _bodies(scene.start.middle[None], size), scene.start.time
-    present = [(one, *presence_of(one)) for one in scene.traffic]
     there = [
         one.shape if one.motion is None else one.at(now)
-        for one, begin, end in present
+        for one, begin, end in [(one, *presence_of(one)) for one in scene.traffic]
         if begin <= now <= end
     ]
     edge = shapely.boundary(RECENT.once(drivable_area, scene.lanelets))

@@ -200,8 +200,7 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
             apart = np.hypot(*(ring[:2] - ring[:1:-1]).T)
             if apart.max() > ROUNDED and (apart <= np.where(amid, SEAM, ROUNDED)).all():
                 rings.append(ring)
-    parts = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-    area = _flat(_flat(parts))
+    area = _flat(_flat([shapely.make_valid(shapely.Polygon(ring)) for ring in rings]))
     grown = shapely.buffer(area, ROUNDED, join_style="mitre")
     return _flat(united([area, shapely.buffer(grown, -ROUNDED, join_style="mitre")]))
 

@@ -113,8 +113,7 @@ def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | Non
     reach = ASIDE * COLUMNS * aside
     line = shapely.LineString([point - reach, point + reach])
     near = [one for one in scene.lanelets if shapely.LinearRing(one.ring).distance(line) <= 0.0]
-    parts = shapely.get_parts(shapely.intersection(line, drivable_area(near))) if near else ()
-    for part in parts:
+    for part in shapely.get_parts(shapely.intersection(line, drivable_area(near))) if near else ():
         if shapely.distance(part, shapely.Point(point)) <= ROUNDED:
             offsets = (shapely.get_coordinates(part) - point) @ aside
             return float(offsets.max()), float(-offsets.min())
@@ -146,8 +145,7 @@ def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]
         region = shapely.make_valid(shapely.Polygon(place))
         for lanelet in lanelets:
             piece = shapely.make_valid(shapely.Polygon(lanelet.ring))
-            common = shapely.intersection(piece, region).area
-            if common > SHARE * min(piece.area, region.area):
+            if shapely.intersection(piece, region).area > SHARE * min(piece.area, region.area):
                 found.append(lanelet.number)
     return found
 
@@ -185,8 +183,7 @@ def _straight_on(lanelets: dict[int, Lanelet], number: int, *, known: set[int]) 
     more: list[int] = []
     left = BEYOND
     while left > 0.0:
-        steps = np.diff(lanelets[number].center, axis=0)
-        ahead = np.arctan2(*steps[-1][::-1])
+        ahead = np.arctan2(*np.diff(lanelets[number].center, axis=0)[-1][::-1])
         after = [k for k in lanelets[number].successors if k in lanelets and k not in known]
         if not after:
             break
@@ -236,8 +233,7 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     points = np.stack([np.interp(at, station, longer[:, k]) for k in range(2)], axis=-1)
     steps = np.gradient(points, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    limit = limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
-    return points, heading, limit
+    return points, heading, limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
 
 
 def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array) -> Array:

@@ -245,10 +245,8 @@ def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
     x, y = scene.start.middle[:2].tolist()
     around = shapely.box(x - far, y - far, x + far, y + far)
     near = tuple(lanelet for lanelet in scene.lanelets if _meets(lanelet, around))
-    area = RECENT.once(drivable_area, near)
-    road = shapely.simplify(shapely.intersection(area, around), SIMPLER)
-    strip = shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road)
-    return obstacles_in(strip)
+    road = shapely.simplify(shapely.intersection(RECENT.once(drivable_area, near), around), SIMPLER)
+    return obstacles_in(shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road))
 
 
 def _grown(shape: Shape, by: float) -> tuple[Obstacle, ...]:

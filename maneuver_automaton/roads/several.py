@@ -158,8 +158,7 @@ def _in_order(
 
 def _seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
     """What a vehicle is going to do as a road user for others, a little larger than it is."""
-    size = [vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM]
-    body = Box(size, [vehicle.ahead, 0.0])
+    body = Box([vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM], [vehicle.ahead, 0.0])
     return Obstacle(body, motion=Motion(times, poses), name=name)
 
 

@@ -199,8 +199,7 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
     elif isinstance(shape, Box):
         plain = str(shape.heading) == "0.0"  # -0.0 is not
         heading = {} if plain else {"heading_rad": float(shape.heading)}
-        box = {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}
-        entry["box_m"] = box
+        entry["box_m"] = {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}
     else:
         entry |= {"polygon_m": shape.corners.tolist(), **holes_entry(shape)}
     if obstacle.height is not None:

@@ -273,8 +273,7 @@ def _mark(cast: Cast) -> float:
     if len(cast.actors) == 1:
         return cast.size
     extent = float(np.ptp(cast.box, axis=0).max())
-    reach = max(one.reach for one in cast.actors)
-    return min(extent, max(BODIES * reach, LEAST_MARK * extent))
+    return min(extent, max(BODIES * max(one.reach for one in cast.actors), LEAST_MARK * extent))
 
 
 def _add_vehicles(
