@@ -192,9 +192,7 @@ class _Motion:
 
     def _paces(self, twists: Array) -> Array:
         """Factors (...,) of rates to be rates per second."""
-        if self.cost.per == "second":
-            return np.ones(twists.shape[:-1])
-        return _speeds(twists)
+        return np.ones(twists.shape[:-1]) if self.cost.per == "second" else _speeds(twists)
 
     def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""

@@ -137,15 +137,11 @@ def _live(bar: Any) -> Iterator[None]:
             _shown.remove(bar)
 
 
-def _nothing(n: int = 1) -> None:
-    """Where there is no terminal, or a bar already."""
-
-
 @contextlib.contextmanager
 def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
     """A bar for `total` pieces of work; yields what to call after each."""
     if quiet or _shown or not has_terminal():
-        yield _nothing
+        yield lambda n=1: None
         return
     from rich.console import Console
     from rich.progress import Progress

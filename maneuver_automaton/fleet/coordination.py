@@ -366,11 +366,10 @@ class _Floor:
     asides: Counter[int] = field(default_factory=Counter)
 
     def in_order(self, order: Sequence[int], *, strictly: bool) -> HeldPlans:
-        """The plans of those that arrive, without help if not all do.
-
-        Room is made for the first of an order that needs it; unless `strictly` in order only where
-        none of those that wait can drive home without: who is home may be in the way of others.
-        """
+        """The plans of those that arrive, without help if not all do."""
+        # Room is made for the first of an order that needs it; unless `strictly` in order only
+        # where none of those that wait can drive home without: who is home may be in the way of
+        # others.
         self.waiting = list(order)
         unaided: HeldPlans = {}
         while self.waiting and not self.budget.is_over:

@@ -308,9 +308,7 @@ def _least(one: _DrivenBody, other: _DrivenBody, edges: Array, most: float) -> C
         begins = np.repeat(begins[open_], 2)
         begins[1::2] += width[1::2]
         which = np.repeat(which[open_], 2)
-    if at == math.inf:
-        return None
-    return Closest((one.name, other.name), at, max(best - FINE, 0.0))
+    return None if at == math.inf else Closest((one.name, other.name), at, max(best - FINE, 0.0))
 
 
 def _apart(

@@ -381,9 +381,7 @@ class FleetMember:
             return None
         if schedule is not None:
             best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
-        if not best.cost < known:
-            return None
-        return self._word_found(query, best, aims)
+        return self._word_found(query, best, aims) if best.cost < known else None
 
     def leg(
         self,

@@ -259,10 +259,8 @@ def place_blocks(program: PolishProgram, first: int) -> list[Blocks]:
 
 @functools.lru_cache(maxsize=16)
 def _guard_kind(model: Model, guard: Guard, tightening: float, paced: bool) -> Kind:
-    """One interval within the limits of a guard; the node where all begins gets no room.
-
-    The control points of the cubics with the same values and rates at both nodes keep them.
-    """
+    """One interval within the limits of a guard; the node where all begins gets no room."""
+    # The control points of the cubics with the same values and rates at both nodes keep them.
     casadi = load_casadi()
     dof, own = model.group.dof, len(model.control_names)
     n_x = dof + len(model.reduced_names)
@@ -399,10 +397,8 @@ def _path(model: Model, scene: PolishScene) -> Any:
 def _between(
     model: Model, begin: NodeMotion, end: NodeMotion, *, step: Any, settings: PolishSettings
 ) -> list[tuple[Any, float, float]]:
-    """What keeps reduced states inside their limits between nodes, where they do not run straight.
-
-    The control points of the cubic with the same values and rates at both nodes are kept inside.
-    """
+    """Keeps reduced states inside their limits between nodes where they do not run straight."""
+    # The control points of the cubic with the same values and rates at both nodes are kept inside.
     rows = []
     limits = _tight(model, settings)
     for k in _curved(model):

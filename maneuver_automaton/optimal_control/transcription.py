@@ -75,7 +75,7 @@ def evaluate(
 
     Nothing of the solver is used: the functions of the problem are called on arrays.
     """
-    integrands = [problem.stage_cost or _nothing, *problem.integrals.values()]
+    integrands = [problem.stage_cost or (lambda x, u: 0.0), *problem.integrals.values()]
     n_states = problem.n_states
 
     def field(x: Array, u: Array) -> Array:
@@ -96,10 +96,6 @@ def evaluate(
         worst_defect=_largest(np.abs(defects)),
         worst_violation=_violation(problem, state, control, duration),
     )
-
-
-def _nothing(x: Sequence[Any], u: Sequence[Any]) -> float:
-    return 0.0
 
 
 def _violation(

@@ -274,9 +274,7 @@ def set_bound(problem: Problem, way: Goal | None, goal: Goal) -> float:
 
 def _least(problem: Problem, goal: Goal) -> float:
     """No plan to a goal costs less, whatever its trims: by distance and turn alone."""
-    if problem.has_inertia:
-        return straight_bound(problem, (goal,))
-    return closed_bound(problem, goal)
+    return straight_bound(problem, (goal,)) if problem.has_inertia else closed_bound(problem, goal)
 
 
 def estimates_words(problem: Problem) -> bool:
@@ -330,10 +328,8 @@ class LegCosts:
         return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
 
     def _times(self, words: IntArray, seen: Array) -> Array:
-        """Times (w, k, 2, 3) [s] of words to poses (k, 3) seen from their start; nan: it has none.
-
-        Full turns are left out.
-        """
+        """Times (w, k, 2, 3) [s] of words to poses (k, 3) seen from their start; nan: none."""
+        # Full turns are left out.
         k = len(seen)
         times = steer_batch(
             self.twists,

@@ -190,7 +190,8 @@ def _question(
         return None
     pose = problem.start
     if first is not None:
-        pose = _after(pose, first.maneuver.displacement)
+        group = group_of(pose.size)
+        pose = np.array((group(pose) @ group(first.maneuver.displacement)).pose)
     trim = problem.start_trim if first is None else first.trim.name
     asked = base.starting_at(
         pose,
@@ -205,11 +206,6 @@ def _question(
     )
     least += 0.0 if first is None else problem.maneuver_cost(first.maneuver)
     return BetweenTrims(asked, first, last, served, least)
-
-
-def _after(pose: Array, displacement: Array) -> Array:
-    group = group_of(pose.size)
-    return np.array((group(pose) @ group(displacement)).pose)
 
 
 def _ends(

@@ -348,10 +348,9 @@ class LatticeWords(PlanningStep):
                 self.gained(timed)
 
     def _go_round(self) -> None:
-        """Note a word along the cheapest way of a point, if it costs less than what is known.
-
-        Estimates of the search are too low there to find a way round: it expands the places first.
-        """
+        """Note a word along the cheapest way of a point, if it costs less than what is known."""
+        # Estimates of the search are too low there to find a way round: it expands the places
+        # first.
         query, best = self.query, self.words[-1]
         paid = best.cost - with_price(query.library.priced, best).cost
         for problem in with_cheapest_way_left(query) if paid > PAID * best.cost else ():

@@ -290,9 +290,7 @@ def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
         beside = [n for n in (k - 1, k + 1) if 0 <= n < len(runs)]
         runs[k] = runs[k]._replace(turn=runs[max(beside, key=lambda n: weight(runs[n]))].turn)
         runs = _joined(runs)
-    if len(runs) == 1 and weight(runs[0]) < 1.0:
-        return [runs[0]._replace(turn=0)]
-    return runs
+    return [runs[0]._replace(turn=0)] if len(runs) == 1 and weight(runs[0]) < 1.0 else runs
 
 
 def _joined(runs: Sequence[_Run]) -> list[_Run]:

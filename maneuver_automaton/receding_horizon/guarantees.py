@@ -95,9 +95,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None
-    effort = 0.0
-    if fixed and cost:
-        effort = _least_effort(problem, cost)
+    effort = _least_effort(problem, cost) if fixed and cost else 0.0
     return Promises(
         least_rate=max(least, 0.0),
         rest_rate=rest,

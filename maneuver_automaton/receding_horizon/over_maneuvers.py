@@ -95,9 +95,7 @@ class OverManeuvers(StepSearch):
     def continued(self, plan: Plan, after: float) -> Plan | None:
         """The first seconds of a plan, then a fail-safe trajectory, if FCL finds nothing either."""
         whole = super().continued(plan, after)
-        if whole is None or not allowed(self.here, whole) or self._hit(whole):
-            return None
-        return whole
+        return None if whole is None or not allowed(self.here, whole) or self._hit(whole) else whole
 
     def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The cheapest safe word for each goal, if it costs less than the kept plan.

@@ -97,10 +97,9 @@ class Situation:
                 self._go_on_from(state, last)
 
     def _go_on_from(self, state: Array, last: Step) -> None:
-        """Put a maneuver from the measured state in place of what was committed, if they differ.
-
-        Where the plan is over, one leads to the trim in which it ended, unless the vehicle stands.
-        """
+        """Put a maneuver from the measured state in place of what was committed, if they differ."""
+        # Where the plan is over, one leads to the trim in which it ended, unless the vehicle
+        # stands.
         assert self.rest is not None
         here, model = self.here, self.here.automaton.model
         if self.rest.trims:
@@ -230,9 +229,7 @@ class Situation:
     def padded(self, plan: Plan) -> Plan:
         """The plan, then rest for the remainder of a fixed time."""
         total, pad = self.here.horizon.time, self.settings.pad
-        if total is None or pad is None:
-            return plan
-        return rested(plan, pad, total - plan.duration)
+        return plan if total is None or pad is None else rested(plan, pad, total - plan.duration)
 
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""

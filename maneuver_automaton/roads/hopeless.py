@@ -76,10 +76,8 @@ def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]
 
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
-    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
-
-    The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
-    """
+    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen."""
+    # The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
     model, start = vehicle.model, scene.start
     lasts = goal.time[1] - start.time
     if lasts < -EXACT:
@@ -107,11 +105,10 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
 
 
 def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, most: float) -> str:
-    """Why who drives `most` forwards [m] never gets back to a goal; empty if that cannot be seen.
-
-    Before its heading is across that of the start, its rear axle has moved aside by its least
-    radius, and ahead of that is its front. Without it, the rear axle is never behind where it was.
-    """
+    """Why who drives `most` forwards [m] never gets back to a goal; empty if that is not seen."""
+    # Before its heading is across that of the start, its rear axle has moved aside by its least
+    # radius, and ahead of that is its front. Without it, the rear axle is never behind where it
+    # was.
     back = max(vehicle.ahead, 0.0)
     corners = np.array([[-back, -FAR], [FAR, -FAR], [FAR, FAR], [-back, FAR]])
     away = goal.away_from(shapely.Polygon(SE2(middle).act(corners)))
@@ -131,11 +128,9 @@ def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, mo
 def _may_fit(
     places: Sequence[Shape], headings: tuple[float, float], road: Any, vehicle: RoadVehicle
 ) -> bool:
-    """Whether the body may be on the road with its middle in a place, at one of the headings.
-
-    Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
-    box have in common of the body is not on the road, in each of them.
-    """
+    """Whether the body may be on the road with its middle in a place, at one of the headings."""
+    # Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
+    # box have in common of the body is not on the road, in each of them.
     shapely.prepare(road)
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     corners = np.concatenate(outlines_of(places))
@@ -212,11 +207,9 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
 def _met(
     scene: RoadScene, vehicle: RoadVehicle, road: Any, walls: Mapping[str, Sequence[Wall]]
 ) -> list[bool]:
-    """Whether the middle of a vehicle can get to each goal, past walls that are there for a time.
-
-    From one time at which a wall comes or goes to the next, it stays in a connected part of what
-    they leave of the road, and gets no further than the top speed allows.
-    """
+    """Whether the middle of a vehicle can get to each goal, past walls that stand for a time."""
+    # From one time at which a wall comes or goes to the next, it stays in a connected part of what
+    # they leave of the road, and gets no further than the top speed allows.
     begin, last = scene.start.time, scene.last_time
     every = [one for some in walls.values() for one in some]
     times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})

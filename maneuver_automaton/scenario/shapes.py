@@ -119,11 +119,9 @@ def zones_of(
 def _zones_of_mask(
     document: Document, part: ZonePart, k: int, path: Path, fastest: float
 ) -> Iterator[Zone]:
-    """A zone for each region of one value of a speed mask, read as Nav2's speed filter does.
-
-    Source: nav2_costmap_2d, `SpeedFilter`: 0 is no limit, nor is a speed that is not above 0, or of
-    more than 100 %.
-    """
+    """A zone for each region of one value of a speed mask, read as Nav2's speed filter does."""
+    # Source: nav2_costmap_2d, `SpeedFilter`: 0 is no limit, nor is a speed that is not above 0, or
+    # of more than 100 %.
     limit = part.speed_limit
     if limit is None:
         raise document.error(("zones", k), "map: needs speed_limit: {base, multiplier, unit}")
