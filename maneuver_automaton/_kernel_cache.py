@@ -155,8 +155,7 @@ def _places(kinds: Any) -> list[str]:
     found = []
     for kind in kinds:
         if isinstance(kind, BaseTuple):
-            place = getattr(kind, "instance_class", tuple).__module__
-            found += [place, *_places(kind.types)]
+            found += [getattr(kind, "instance_class", tuple).__module__, *_places(kind.types)]
     return found
 
 

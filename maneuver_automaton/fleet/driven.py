@@ -268,8 +268,7 @@ def _closest(bodies: Sequence[_DrivenBody], edges: Array, most: float) -> tuple[
         if one.name == other.name:
             continue
         pair = (one.name, other.name)
-        known = found[pair].distance_m if pair in found else most
-        row = _least(one, other, edges, known)
+        row = _least(one, other, edges, found[pair].distance_m if pair in found else most)
         if row is not None:
             found[pair] = row
     return tuple(sorted(found.values(), key=lambda row: row.distance_m))

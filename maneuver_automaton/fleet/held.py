@@ -376,13 +376,12 @@ def _is_free(
     """Whether the kernels prove that a body keeps a distance [m] until a time [s]."""
     world = world_of(problem.obstacles, shapes, frame, keep=keep)
     lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
-    margin = PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep)
     free = free_times(
         world,
         world.into(motion.pose),
         twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
         durations=lasting,
-        margin=margin,
+        margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
         keep=keep,
         times=motion.time,
     )

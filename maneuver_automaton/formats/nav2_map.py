@@ -283,8 +283,7 @@ def _binary(path: Path, body: bytes, n: int, greatest: int) -> NDArray[np.uint16
         raise InvalidScenario(
             f"{path}: got {len(body)} bytes of pixels, need {n * size}: the rest belongs to nothing"
         )
-    values = np.frombuffer(body[: n * size], dtype=np.uint8 if size == 1 else ">u2")
-    return values.astype(np.uint16)
+    return np.frombuffer(body[: n * size], dtype=np.uint8 if size == 1 else ">u2").astype(np.uint16)
 
 
 def _plain(path: Path, body: bytes, n: int, greatest: int) -> NDArray[np.uint16]:

@@ -538,7 +538,6 @@ def _twist(time: Array, pose: Array) -> Array:
     last = int(np.flatnonzero(np.abs(pose[:, 2] - pose[0, 2]) < np.pi)[-1])
     if last == 0:
         raise ValueError("trajectory: two samples of a trim are half a turn apart, need more")
-    motion = group(pose[0]).inverse() @ group(pose[last])
-    twist = motion.log() / (time[last] - time[0])
+    twist = (group(pose[0]).inverse() @ group(pose[last])).log() / (time[last] - time[0])
     twist[2] = (pose[-1, 2] - pose[0, 2]) / span  # the longer stretch says it better
     return np.asarray(twist, dtype=np.float64)

@@ -96,8 +96,7 @@ def arrivals_of(
     blocked = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
     if all(blocked):
         proven = len(found) == 1 and not via.radius
-        status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
-        return (), (status, _about(blocked[0]))
+        return (), (PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN, _about(blocked[0]))
     return tuple(one for one, why in zip(found, blocked, strict=True) if not why), None
 
 
@@ -323,8 +322,7 @@ class LegCosts:
             return self.car.per_metre * lengths.reshape(len(begins), len(ends))
         times = self._times(self.words, seen)
         rates = self.rates[self.words][:, None, None]
-        sums = np.where(np.isnan(times), np.inf, times * rates).sum(axis=-1)
-        least = sums.min(axis=(0, 2))
+        least = np.where(np.isnan(times), np.inf, times * rates).sum(axis=-1).min(axis=(0, 2))
         return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
 
     def _times(self, words: IntArray, seen: Array) -> Array:

@@ -231,10 +231,9 @@ def _parts(name: str, samples: _Samples) -> list[TrackPiece]:
         twist = _twist(part.time, part.pose)
         if not whole and run.turn == 0:
             twist[2] = 0.0  # what it still turns can hardly be seen
-        said = motion(twist)
         pieces.append(
             TrackPiece(
-                name=name if whole and name != POLISHED else f"{name}, {said}",
+                name=name if whole and name != POLISHED else f"{name}, {motion(twist)}",
                 twist=twist,
                 time=part.time,
                 pose=part.pose,

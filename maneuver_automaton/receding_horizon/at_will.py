@@ -125,8 +125,7 @@ class InFreeSpace(StepSearch):
             return None
         if not now.rounding or now.changed or not (last.exhaustive and last.is_sole):
             return None
-        left = last.value - last.applied_cost
-        if self.settings.continuous or bounded(here) or cost > tied(left):
+        if self.settings.continuous or bounded(here) or cost > tied(last.value - last.applied_cost):
             return None
         if not last.plan.trims or last.plan.durations[0] < last.applied - NOTHING:
             return None

@@ -217,8 +217,7 @@ def _plan(
             held = automaton.trims[library.trims[search.links[row, kernels.TRIM]]]
             _coast(word, times, between, held, float(search.nodes[row, kernels.LASTING]))
     trim = int(search.links[last, kernels.TRIM])
-    rest = int(task.rest_of[library.arrays.library.class_of[trim]])
-    goes_on = rest if task.rests else trim
+    goes_on = int(task.rest_of[library.arrays.library.class_of[trim]]) if task.rests else trim
     left = float(search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK])
     if goes_on >= 0 and (task.rests or left > 0.0):
         _coast(word, times, between, automaton.trims[library.trims[goes_on]], left)

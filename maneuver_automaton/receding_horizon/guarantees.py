@@ -95,12 +95,11 @@ def promises(problem: Problem, *, step: float) -> Promises:
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None
-    effort = _least_effort(problem, cost) if fixed and cost else 0.0
     return Promises(
         least_rate=max(least, 0.0),
         rest_rate=rest,
         time_rate=cost.time if cost and not fixed else 0.0,
-        effort=effort,
+        effort=_least_effort(problem, cost) if fixed and cost else 0.0,
         horizon=problem.horizon.time,
         step=step,
         switch=cost.switch if cost and fixed else 0.0,
@@ -229,8 +228,7 @@ class LoopBounds:
         pose = here.start[:3]
         driven = accumulated - self.since
         beside = 0.0 if self.whole is None else self.whole.anywhere(pose)
-        on_the_way = 0.0 if self.finest is None else self.finest.after(pose, driven)
-        best = max(beside, on_the_way)
+        best = max(beside, 0.0 if self.finest is None else self.finest.after(pose, driven))
         proven = in_costs(here, best) if best > 0.0 else 0.0
         return max(proven, self.least - (accumulated - self.at))
 

@@ -140,8 +140,7 @@ def _orders(trims: tuple[Trim, ...]) -> tuple[list[list[float]], list[int], bool
     twists = [trim.body_velocity.tolist() for trim in trims]
     moving = [k for k, twist in enumerate(twists) if any(twist)]
     rests_last = moving == list(range(len(moving)))
-    fixed = rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
-    return twists, moving, fixed
+    return twists, moving, rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:

@@ -348,8 +348,7 @@ def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -
     while not (all(one.is_done for one in drivers.values()) or stopped()):
         time = now + number * step
         for name, driver in drivers.items():
-            waits = driver.planner.time_of(driver.tick) > time + TIME_TOLERANCE
-            if driver.is_done or waits:
+            if driver.is_done or (driver.planner.time_of(driver.tick) > time + TIME_TOLERANCE):
                 continue
             others = [
                 held
