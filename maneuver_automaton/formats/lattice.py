@@ -169,8 +169,7 @@ def _twists(poses: Array) -> Array:
 
 def _course(move: Move, speed: float, turn_rate: float) -> Trajectory:
     """The motion from pose to pose, seen from the first one."""
-    poses = move.poses
-    poses = poses[np.append(True, np.any(np.diff(poses, axis=0) != 0.0, axis=1))]
+    poses = move.poses[np.append(True, np.any(np.diff(move.poses, axis=0) != 0.0, axis=1))]
     steps = _twists(poses)
     spans = np.maximum(np.hypot(steps[:, 0], steps[:, 1]) / speed, np.abs(steps[:, 2]) / turn_rate)
     control = steps / np.where(spans > 0.0, spans, 1.0)[:, None]

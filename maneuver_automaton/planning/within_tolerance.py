@@ -184,8 +184,7 @@ def _poses_within(goal: Goal, start: Array) -> Iterator[Array]:
             yield foot
     turns = [0.0]
     if turned and not goal.free_heading:
-        turns = [float(np.clip(turn, -turned, turned)), turned, -turned, 0.0]
-        turns = list(dict.fromkeys(turns))
+        turns = [*dict.fromkeys([float(np.clip(turn, -turned, turned)), turned, -turned, 0.0])]
     shifts = [np.zeros(len(places))]
     if far:
         towards = math.atan2(offset[1], offset[0])
