@@ -45,8 +45,7 @@ def as_array(
     held = array[~np.isinf(array)] if infinite else array
     few = held.size <= FEW
     if not (all(map(math.isfinite, held.ravel().tolist())) if few else np.isfinite(held).all()):
-        bad = held[~np.isfinite(held)].flat[0]
-        raise ValueError(f"{name}: got {bad}, need finite numbers")
+        raise ValueError(f"{name}: got {held[~np.isfinite(held)].flat[0]}, need finite numbers")
     return array
 
 

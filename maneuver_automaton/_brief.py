@@ -76,5 +76,4 @@ def _shown(value: Any, depth: int) -> str:
 
 
 def _joined(items: list[str], n: int) -> str:
-    more = [f"... {n} in all"] if n > len(items) else []
-    return ", ".join([*items, *more])
+    return ", ".join(items + [f"... {n} in all"] * (n > len(items)))

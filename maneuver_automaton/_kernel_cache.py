@@ -125,10 +125,8 @@ class KernelCache:
 
 @functools.cache
 def _find_memory() -> None:
-    """Name what compiled kernels call for their memory; the rest of it is compiled into them.
-
-    numba does so as well, and then compiles that rest in each process, for 20 ms.
-    """
+    """Name what compiled kernels call for their memory; the rest of it is compiled into them."""
+    # numba does so as well, and then compiles that rest in each process, for 20 ms.
     for name, address in _nrt_python.c_helpers.items():
         add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
@@ -157,8 +155,7 @@ def _places(kinds: Any) -> list[str]:
     found = []
     for kind in kinds:
         if isinstance(kind, BaseTuple):
-            place = getattr(kind, "instance_class", tuple).__module__
-            found += [place, *_places(kind.types)]
+            found += [getattr(kind, "instance_class", tuple).__module__, *_places(kind.types)]
     return found
 
 

@@ -118,3 +118,14 @@ class LaterModule(ModuleType):
             isinstance(value, ModuleType) and spec.loader_state and name in spec.loader_state[1]
         ):
             super().__setattr__(name, value)
+
+
+class Outside(ModuleType):
+    """A module of another package, imported when it is asked for a name: many programs never do."""
+
+    def __getattr__(self, name: str) -> Any:
+        vars(self)[name] = value = getattr(importlib.import_module(self.__name__), name)
+        return value
+
+
+shapely: Any = Outside("shapely")

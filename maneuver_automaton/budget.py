@@ -114,8 +114,7 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
-        now = self.clock()
-        return replace(self, deadline=now + share * self.left)
+        return replace(self, deadline=self.clock() + share * self.left)
 
     @property
     def left_to_check(self) -> float:

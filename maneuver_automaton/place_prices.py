@@ -192,9 +192,7 @@ class _Motion:
 
     def _paces(self, twists: Array) -> Array:
         """Factors (...,) of rates to be rates per second."""
-        if self.cost.per == "second":
-            return np.ones(twists.shape[:-1])
-        return _speeds(twists)
+        return np.ones(twists.shape[:-1]) if self.cost.per == "second" else _speeds(twists)
 
     def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""
@@ -278,5 +276,4 @@ def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
         return np.array([0.0, maneuver.duration]), np.abs(maneuver.displacement[None])
     changes = (course.control[1:-1] != course.control[:-2]).any(axis=1)
     rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
-    steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
-    return course.time[rows], steps
+    return course.time[rows], np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle, AnyShape, Box, OccupancyMap, Shape, as_shapes
@@ -383,8 +384,6 @@ class Ground:
 
     def least(self, low: ArrayLike, high: ArrayLike) -> float:
         """A number that no rate is below while x and y [m] are between two corners (2,)."""
-        import shapely
-
         if self.raster is not None:
             return self.price * self.raster.least(np.asarray(low), np.asarray(high))
         box = shapely.box(*np.asarray(low)[:2], *np.asarray(high)[:2])
@@ -401,8 +400,6 @@ class Ground:
         return replace(self, areas=tuple(one.moved(by) for one in self.areas), raster=raster)
 
     def _inside(self, places: Array) -> NDArray[np.bool_]:
-        import shapely
-
         inside = np.zeros(places.shape[:-1], dtype=np.bool_)
         for part in parts_of(self.areas):
             x, y = np.moveaxis(places - part.middle, -1, 0)
@@ -416,8 +413,6 @@ class Ground:
 
     def _depths(self, places: Array) -> Array:
         """From 0 half an edge outside of all areas to 1 as far inside of one, without a kink."""
-        import shapely
-
         parts, points = parts_of(self.areas), shapely.points(places)
         depth = np.full(places.shape[:-1], -math.inf)
         for disc in parts:

@@ -596,8 +596,7 @@ class Problem:
         coasting = float(self.rates_of_trims(trims) @ durations)
         if not prices_switches(self.cost):
             return coasting
-        velocities = np.array([trim.body_velocity for trim in trims])
-        return coasting + self.cost.switching(velocities)
+        return coasting + self.cost.switching(np.array([trim.body_velocity for trim in trims]))
 
     def maneuver_cost(self, maneuver: Maneuver) -> float:
         """Cost of a maneuver without the prices of switches.

@@ -125,8 +125,7 @@ class Via:
         freeze(self, "gate")
         if self.pose is None:
             middle = (gate[0] + gate[1]) / 2.0
-            across = math.atan2(along[0], -along[1])
-            object.__setattr__(self, "pose", np.insert(middle, 2, across))
+            object.__setattr__(self, "pose", np.insert(middle, 2, math.atan2(along[0], -along[1])))
             object.__setattr__(self, "free_heading", True)
 
     @property
@@ -165,8 +164,7 @@ class Via:
         group = type(by)
         gate = self.gate
         if gate is not None:
-            ends = np.insert(gate, 2, 0.0, axis=1)
-            gate = np.delete((by @ group(ends)).pose, 2, axis=1)
+            gate = np.delete((by @ group(np.insert(gate, 2, 0.0, axis=1))).pose, 2, axis=1)
         return replace(self, pose=(by @ group(self.pose)).pose, gate=gate)
 
     def shifted(self, by: Array) -> Via:

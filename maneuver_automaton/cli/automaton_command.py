@@ -233,8 +233,7 @@ def design(
 
 def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
     """The library of a library file, with fewer maneuvers."""
-    others = [key for key in instead if key != "most"]
-    if others or "most" not in instead:
+    if {*instead} != {"most"}:
         raise InvalidScenario(
             f"{file}: of a library with maneuvers --most says how many are kept, and nothing else; "
             "a factor is proven for the trims of a build file with the key design"

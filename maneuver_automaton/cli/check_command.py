@@ -150,8 +150,7 @@ def _constraint(bounds: Bounds, model: Model) -> Callable[[Array, Array], Array]
         return None
 
     def excess(state: Array, control: Array) -> Array:
-        rows = [(low - state[k], state[k] - high) for k, (low, high) in pairs]
-        return np.array(rows).ravel()
+        return np.array([(low - state[k], state[k] - high) for k, (low, high) in pairs]).ravel()
 
     return excess
 
@@ -203,8 +202,7 @@ def _states_after(model: Model, states: Array, controls: Array) -> Array:
     def rates(state: Array, control: Array) -> Array:
         return field(state.reshape(states.shape), control.reshape(controls.shape)).ravel()
 
-    times = [0.0, TRIM_SECONDS]
-    ends = rollout(rates, states.ravel(), control=controls.ravel(), times=times)
+    ends = rollout(rates, states.ravel(), control=controls.ravel(), times=[0.0, TRIM_SECONDS])
     return np.asarray(ends[-1].reshape(states.shape))
 
 

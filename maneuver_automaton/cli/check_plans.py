@@ -66,8 +66,7 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
         return scenario.name, _loop(path, file.document, file.result())
     if file.kind == "loop":
         loop = file.result()
-        found = _loop(path, file.document, _log_of(loop))
-        return scenario.name, [*found, *_on_the_way(loop)]
+        return scenario.name, [*_loop(path, file.document, _log_of(loop)), *_on_the_way(loop)]
     plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), naming(path):
         verdict = verify(scenario.problem, plan, leave=leave or None)

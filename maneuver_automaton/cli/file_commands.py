@@ -61,8 +61,7 @@ def show_cache() -> int:
         if folder.name == FOLDER:
             what = f"tables of the cost to go, at most {MOST_BYTES / MEGABYTE:g} MB"
         rows.append([what, str(len(files)), f"{size:.1f}", str(folder)])
-    columns = ["", "files", "MB", "folder"]
-    console().print(table("", columns, rows, numbers=(1, 2)), soft_wrap=True)
+    console().print(table("", ["", "files", "MB", "folder"], rows, numbers=(1, 2)), soft_wrap=True)
     return FOUND
 
 
@@ -273,8 +272,7 @@ def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Pa
         if isinstance(obstacle, OccupancyMap) and not any(obstacle is cells for cells in known)
     ]
     try:
-        stated = replace(scenario, maps=(*scenario.maps, *new))
-        text = to_yaml(stated, folder=target.parent)
+        text = to_yaml(replace(scenario, maps=(*scenario.maps, *new)), folder=target.parent)
     except ValueError as error:
         raise InvalidScenario(f"{source}: {str(error).removeprefix(f'{source}: ')}") from error
     make_folder(target.parent)

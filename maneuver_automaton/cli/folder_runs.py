@@ -217,8 +217,7 @@ def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path
             with contextlib.suppress(InvalidScenario):  # told when the file is planned
                 yield map_beside(path).resolve()
         document = documents.get(path)
-        value = document.value if document is not None else None
-        for obstacle in _obstacles(value):
+        for obstacle in _obstacles(document.value if document is not None else None):
             name = obstacle.get("map") if isinstance(obstacle, dict) else None
             if isinstance(name, str) and "\0" not in name:
                 yield (folder / name).resolve()

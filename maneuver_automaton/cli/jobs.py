@@ -79,7 +79,6 @@ class JobResult:
         """For the table of a folder; with its numbers, if they are `known`."""
         found = {one.label: one.value for one in self.all_facts if not isinstance(one.value, str)}
         numbers = found if known else {}
-        near = [numbers[one] for one in NEAR if one in numbers]
         return folder_runs.Row(
             name=path.name,
             code=FOUND if self.done else NO_PLAN,
@@ -87,7 +86,7 @@ class JobResult:
             reason="".join(f"{path}: {line}\n" for line in self.complaints),
             cost=numbers.get("cost"),
             duration=numbers.get("duration", numbers.get("last arrival")),
-            clearance=min(near, default=None),
+            clearance=min([numbers[one] for one in NEAR if one in numbers], default=None),
             first_plan=self.first_plan,
         )
 

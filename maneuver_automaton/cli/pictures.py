@@ -28,8 +28,7 @@ def draw(result: Any, name: str, file: Path, options: Options) -> None:
         if is_plan and plotting.flies_among_heights(recording):
             plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
         if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
-            progress = file.with_name("progress.png")
-            plotting.save_progress_figure(result, progress, title=look.title)
+            plotting.save_progress_figure(result, file.with_name("progress.png"), title=look.title)
         if recording.alternatives:
             path = file.with_name("alternatives.png")
             plotting.save_picture(recording, path, look=look, view="alternatives")
@@ -37,8 +36,7 @@ def draw(result: Any, name: str, file: Path, options: Options) -> None:
         save_film(recording, file.with_suffix(".gif"), options.look.look(name))
     page = options.html or (options.animate and file.name == "closed_loop")
     if page and (moves or not on_roads or len(recording.movers) == 1):
-        player = plotting.player_of(result, title=options.look.title or name)
-        player.save(file.with_suffix(".html"))
+        plotting.player_of(result, title=options.look.title or name).save(file.with_suffix(".html"))
 
 
 def save_film(recording: Recording, path: Path, look: Look) -> None:

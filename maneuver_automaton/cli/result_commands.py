@@ -180,8 +180,7 @@ def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOpti
     elif what == "animation":
         plotting.save_film(plan, path)
     else:
-        title = look.title or name or path.stem
-        plotting.player_of_file(document, plan, title=title).save(path)
+        plotting.player_of_file(document, plan, title=look.title or name or path.stem).save(path)
 
 
 def _picture_target(file: Path, out: Path | None, what: str) -> Path:

@@ -89,8 +89,7 @@ def print_result(name: str, tables: Sequence[recording.Table], facts: Iterable[F
         if one.title:
             continue
         if one.rows:
-            rows = shortened(one.rows)
-            out.print(table(title, one.columns, rows, numbers=one.numbers))
+            out.print(table(title, one.columns, shortened(one.rows), numbers=one.numbers))
             title = ""
         elif one.instead:
             out.print(f"{title}\n\n  {one.instead}\n")
@@ -108,8 +107,7 @@ def shortened(rows: list[list[str]]) -> list[list[str]]:
     """The first and the last rows of a table that has many."""
     if len(rows) <= MOST_ROWS:
         return rows
-    gap = ["...", *[""] * (len(rows[0]) - 1)]
-    return [*rows[: MOST_ROWS - 5], gap, *rows[-4:]]
+    return [*rows[: MOST_ROWS - 5], ["...", *[""] * (len(rows[0]) - 1)], *rows[-4:]]
 
 
 _shown: list[Any] = []  # what rich shows on the terminal: one bar at most
@@ -139,15 +137,11 @@ def _live(bar: Any) -> Iterator[None]:
             _shown.remove(bar)
 
 
-def _nothing(n: int = 1) -> None:
-    """Where there is no terminal, or a bar already."""
-
-
 @contextlib.contextmanager
 def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
     """A bar for `total` pieces of work; yields what to call after each."""
     if quiet or _shown or not has_terminal():
-        yield _nothing
+        yield lambda n=1: None
         return
     from rich.console import Console
     from rich.progress import Progress

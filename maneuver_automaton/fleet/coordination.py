@@ -211,9 +211,8 @@ class _Priorities:
     ) -> HeldPlans | None:
         """Plans in which one, and all behind it that meet those before them, give way."""
         plans = dict(plans)
-        behind = {k for one, k in pairs if one == first}
         # Those before others first.
-        turn = [first, *sorted(behind)]
+        turn = [first, *sorted({k for one, k in pairs if one == first})]
         for k in sorted(turn, key=lambda k: (sum(other == k for _, other in pairs), k)):
             above = {one: plans[one] for one, other in sorted(pairs) if other == k}
             courses = {j: plans[j].course for j in (k, *above)}
@@ -297,8 +296,7 @@ def by_conflicts(
             return node.plans
         for k, other in ((met.one, met.other), (met.other, met.one)):
             mine, its = node.plans[k].course, node.plans[other].course
-            window = (met.time, _until(mine, its, met.time, turns.margin))
-            more = _within(its.obstacles, window)
+            more = _within(its.obstacles, (met.time, _until(mine, its, met.time, turns.margin)))
             avoided = {**node.avoided, k: (*node.avoided.get(k, ()), *more)}
             found = past(k, avoided[k])
             if found is not None:
@@ -324,8 +322,7 @@ def _until(one: FleetCourse, other: FleetCourse, begin: float, keep: float) -> f
     near = np.zeros(times.size, dtype=np.bool_)
     for shapes, motion in zip(one.shapes, one.motions, strict=True):
         poses: Array = motion.at(times)
-        frame = tuple(poses[0].tolist())
-        world = world_of(other.bodies, shapes, frame, keep=keep)
+        world = world_of(other.bodies, shapes, tuple(poses[0].tolist()), keep=keep)
         near |= clearances(world, world.into(poses), times=times) <= keep
     clear = np.flatnonzero(~near[1:])
     return float(times[clear[0] + 1]) if clear.size else math.inf
@@ -369,11 +366,10 @@ class _Floor:
     asides: Counter[int] = field(default_factory=Counter)
 
     def in_order(self, order: Sequence[int], *, strictly: bool) -> HeldPlans:
-        """The plans of those that arrive, without help if not all do.
-
-        Room is made for the first of an order that needs it; unless `strictly` in order only where
-        none of those that wait can drive home without: who is home may be in the way of others.
-        """
+        """The plans of those that arrive, without help if not all do."""
+        # Room is made for the first of an order that needs it; unless `strictly` in order only
+        # where none of those that wait can drive home without: who is home may be in the way of
+        # others.
         self.waiting = list(order)
         unaided: HeldPlans = {}
         while self.waiting and not self.budget.is_over:
@@ -404,8 +400,7 @@ class _Floor:
         if way is None:
             return False
         there = {j: one for j, one in self._courses().items() if j != k}
-        met = meetings({**there, k: way.course}, keep=self.margin, among=[k])
-        for row in met:
+        for row in meetings({**there, k: way.course}, keep=self.margin, among=[k]):
             j = row.other_than(k)
             if self.asides[j] == MOST_ASIDE or not self._drives_aside(j, k, way):
                 return False

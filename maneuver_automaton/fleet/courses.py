@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Box, Disc, Obstacle, Polygon, Shape
@@ -239,7 +240,4 @@ def larger(shape: Shape, by: float) -> Shape:
         return Disc(shape.radius + by, shape.center)
     if isinstance(shape, Box):
         return Box(shape.size + 2.0 * by, shape.center, shape.heading)
-    import shapely
-
-    whole = shapely.Polygon(shape.corners, shape.holes).buffer(by, join_style="mitre")
-    return Polygon(whole)
+    return Polygon(shapely.Polygon(shape.corners, shape.holes).buffer(by, join_style="mitre"))

@@ -18,6 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
@@ -244,16 +245,12 @@ class _DrivenBody:
 
     def solids(self, poses: Array) -> Any:
         """It at poses (n, 3), for shapely."""
-        import shapely
-
         corners = SE2(poses[:, None]).act(self.ring)
         return shapely.points(corners[:, 0]) if len(self.ring) == 1 else shapely.polygons(corners)
 
 
 def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
     """Outer corners (n, 2) of each shape, and by how much it is larger [m]; holes are filled."""
-    import shapely
-
     if not shapes:
         yield np.zeros((1, 2)), 0.0
     for shape in shapes:
@@ -271,8 +268,7 @@ def _closest(bodies: Sequence[_DrivenBody], edges: Array, most: float) -> tuple[
         if one.name == other.name:
             continue
         pair = (one.name, other.name)
-        known = found[pair].distance_m if pair in found else most
-        row = _least(one, other, edges, known)
+        row = _least(one, other, edges, found[pair].distance_m if pair in found else most)
         if row is not None:
             found[pair] = row
     return tuple(sorted(found.values(), key=lambda row: row.distance_m))
@@ -311,17 +307,13 @@ def _least(one: _DrivenBody, other: _DrivenBody, edges: Array, most: float) -> C
         begins = np.repeat(begins[open_], 2)
         begins[1::2] += width[1::2]
         which = np.repeat(which[open_], 2)
-    if at == math.inf:
-        return None
-    return Closest((one.name, other.name), at, max(best - FINE, 0.0))
+    return None if at == math.inf else Closest((one.name, other.name), at, max(best - FINE, 0.0))
 
 
 def _apart(
     one: _DrivenBody, other: _DrivenBody, times: Array, steps: Array, enough: float
 ) -> Array:
     """Distance (n,) of two bodies at times (n,) [s]; a lower bound where it is enough."""
-    import shapely
-
     first, second = one.poses_at(times, steps), other.poses_at(times, steps)
     apart = np.hypot(*(first - second)[:, :2].T) - one.reach - other.reach
     near = apart < enough

@@ -46,8 +46,7 @@ def go_on(now: Moment) -> None:
         if k not in now.held or k in now.state.broken or now.held[k].leads:
             del stopped[k]
         elif k not in now.void:
-            again = replace(left, plan=replace(left.plan, start_time=now.time))
-            for one in now.rejoined(k, again):
+            for one in now.rejoined(k, replace(left, plan=replace(left.plan, start_time=now.time))):
                 if now.searches.is_over or _swap(now, {k: one}):
                     break
 
@@ -102,8 +101,7 @@ def _look_for_better(now: Moment, batch: Sequence[int]) -> None:
         most, others = LONG if hard else QUICK, now.expected_by(k)
         requests.append(request_of(now, k, base, others, known, most=most, room=not hard))
     now.asked += batch
-    answers = answers_to(now, requests)
-    for k, base, known, answer in zip(batch, bases, values, answers, strict=True):
+    for k, base, known, answer in zip(batch, bases, values, answers_to(now, requests), strict=True):
         # An exchange of another one of the batch may have changed it.
         if now.held[k] is not base or k in now.state.silent:
             continue

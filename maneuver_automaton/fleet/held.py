@@ -200,11 +200,9 @@ def onward(
         return None, own.starting_at(rest.start, time=rest.start_time, trim=name)
     head = rest
     if busy < rest.duration - NOTHING:
-        cut = with_samples_at(rest, [rest.start_time + busy], own.automaton.model)
-        head = head_of(cut, busy)
+        head = head_of(with_samples_at(rest, [rest.start_time + busy], own.automaton.model), busy)
     elif busy > rest.duration + NOTHING:
-        ended = replace(rest, start=rest.end)
-        head = followed_by(rest, _standing(ended, busy - rest.duration))
+        head = followed_by(rest, _standing(replace(rest, start=rest.end), busy - rest.duration))
     return head, own.starting_at(head.end, time=rest.start_time + busy, trim=name)
 
 
@@ -216,8 +214,7 @@ def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | No
     state = end_state(rest)
     if same_state(own.first_trim.reduced_state, state):
         return here
-    alike = (one for one in own.automaton.trims if same_state(one.reduced_state, state))
-    trim = next(alike, None)
+    trim = next((one for one in own.automaton.trims if same_state(one.reduced_state, state)), None)
     return None if trim is None else replace(here, start_trim=trim.name)
 
 
@@ -238,8 +235,7 @@ def _standing(rest: Plan, lasting: float) -> Plan:
     """To stand for a time [s] in the rest that a plan ends in."""
     trim = rest.trims[-1] if rest.trims and rest.trims[-1].is_rest else None
     if trim is None:
-        size = rest.start.size
-        still = np.zeros(size)
+        still = np.zeros(rest.start.size)
         trim = Trim(name="rest", body_velocity=still, control=np.zeros(2))
     return Plan(rest.start, (trim,), durations=[lasting], start_time=rest.start_time)
 
@@ -299,16 +295,14 @@ def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> 
     able = [plan for plan in plans if plan is not None]
     if not able:
         return found.given_up()
-    soonest = min(able, key=lambda plan: plan.duration)
-    return _not_leading(vehicle, replace(soonest, start=pose))
+    return _not_leading(vehicle, replace(min(able, key=lambda plan: plan.duration), start=pose))
 
 
 def _without_coasts(vehicle: FleetMember, rest: Plan) -> Plan | None:
     """What is left of a plan, by its maneuvers alone, until it can rest; None if it never can."""
     rests = [one for one in vehicle.problem.automaton.trims if one.is_rest]
     between = rest.maneuvers or (None,) * (len(rest.trims) - 1)
-    begun = int(committed(rest, 0.0) > NOTHING)
-    for n, trim in [*enumerate(rest.trims)][begun:]:
+    for n, trim in [*enumerate(rest.trims)][int(committed(rest, 0.0) > NOTHING) :]:
         alike = (one for one in rests if same_state(one.reduced_state, trim.reduced_state))
         stands = trim if trim.is_rest else next(alike, None)
         if stands is not None:
@@ -382,13 +376,12 @@ def _is_free(
     """Whether the kernels prove that a body keeps a distance [m] until a time [s]."""
     world = world_of(problem.obstacles, shapes, frame, keep=keep)
     lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
-    margin = PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep)
     free = free_times(
         world,
         world.into(motion.pose),
         twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
         durations=lasting,
-        margin=margin,
+        margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
         keep=keep,
         times=motion.time,
     )

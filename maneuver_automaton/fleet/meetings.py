@@ -11,6 +11,7 @@ import networkx as nx
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision.body import Body, body_of, fastest_points
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.world import world_of
@@ -158,10 +159,8 @@ def swept(course: FleetCourse) -> tuple[int, Array, bool]:
     Between two times on a path of length L, whose ends are a distance d apart, no point is farther
     than ``sqrt(L^2 - d^2) / 2`` from the box around the ends.
     """
-    begin = min(float(way.time[0]) for way in course.motions)
-    first = math.floor(begin / SLOT)
-    end = max(float(way.time[-1]) for way in course.motions)
-    count = max(math.ceil(end / SLOT) - first, 0) + 1
+    first = math.floor(min(float(way.time[0]) for way in course.motions) / SLOT)
+    count = max(math.ceil(max(float(way.time[-1]) for way in course.motions) / SLOT) - first, 0) + 1
     boxes = np.tile(np.array(NOWHERE), (count, 1))
     for shapes, way in zip(course.shapes, course.motions, strict=True):
         body = body_of(shapes)
@@ -183,8 +182,7 @@ def _boxes(way: Motion, first: int, count: int) -> Array:
     if len(times) > 1:
         middles = 0.5 * (times[1:] + times[:-1])
         piece = np.clip(np.searchsorted(way.time, middles, side="right") - 1, 0, None)
-        speeds = np.hypot(*np.asarray(way.rates)[piece, :2].T)
-        lengths = speeds * np.diff(times)
+        lengths = np.hypot(*np.asarray(way.rates)[piece, :2].T) * np.diff(times)
         apart = np.hypot(*np.diff(places, axis=0).T)
         aside = 0.5 * np.sqrt(np.maximum(lengths * lengths - apart * apart, 0.0))[:, None]
         low = np.minimum(places[1:], places[:-1]) - aside
@@ -217,8 +215,6 @@ def near_pairs(
     """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m]."""
     if len(discs) < 2:
         return []
-    import shapely
-
     owners = [owner for owner, *_ in discs]
     rows = np.array([row for _, *row in discs])
     index = shapely.STRtree(shapely.points(rows[:, :2]))
@@ -257,8 +253,7 @@ class Nearby:
 
     def gaps(self, box: Array, others: Sequence[FleetCourse]) -> Array:
         """How far each of others (n,) is from a box (4,) at least, whenever it is there [m]."""
-        rows = [self._row(one) for one in others]
-        boxes = self._boxes[rows]
+        boxes = self._boxes[[self._row(one) for one in others]]
         least = boxes[..., :2].min(axis=1)
         most = boxes[..., 2:].max(axis=1)
         beside = np.maximum(np.maximum(least - box[2:], box[:2] - most), 0.0)
@@ -284,8 +279,7 @@ class Nearby:
         first, boxes, leaves = swept(course)
         first -= self._origin
         if first < 0:  # what is before is over
-            cut = min(-first, len(boxes) - 1)
-            boxes, first = boxes[cut:], 0
+            boxes, first = boxes[min(-first, len(boxes) - 1) :], 0
         while first + len(boxes) + 1 > self._boxes.shape[1]:
             last = np.repeat(self._boxes[:, -1:], self._boxes.shape[1], axis=1)
             self._boxes = np.concatenate([self._boxes, last], axis=1)

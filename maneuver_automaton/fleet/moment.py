@@ -197,8 +197,7 @@ class Moment:
         """Whether a plan keeps apart from others, and is free of what is not of the fleet."""
         if self.first_meeting(k, found, others) < math.inf:
             return False
-        keep = self.near.get(k, math.inf)
-        return not why_not_free(self.vehicles[k], self.left_of(found), keep)
+        return not why_not_free(self.vehicles[k], self.left_of(found), self.near.get(k, math.inf))
 
     def expected_by(self, k: int, but: Collection[int] = ()) -> list[Other]:
         """All plans that others may drive, as a vehicle knows it, each with its number."""
@@ -302,8 +301,7 @@ class Moment:
     def near_to(self, k: int, found: OwnPlan) -> list[int]:
         """Those that may come near a vehicle that drives a plan."""
         others = [j for j in self.held if j != k]
-        courses = [self.held[j].course for j in others]
-        near = self.nearby.near(found.course, courses, keep=self.keep)
+        near = self.nearby.near(found.course, [self.held[j].course for j in others], keep=self.keep)
         return [j for j, is_near in zip(others, near, strict=True) if is_near]
 
 

@@ -313,10 +313,9 @@ class _FleetSearch:
         return tasks
 
     def _task(self, rng: np.random.Generator, busy: set[int], *, longer: bool) -> PoolTask | None:
-        """A group and how to plan it, unless that was asked of the same plans before.
-
-        Where the quick searches hardly gain any more, what was asked before is improved for longer.
-        """
+        """A group and how to plan it, unless that was asked of the same plans before."""
+        # Where the quick searches hardly gain any more, what was asked before is improved for
+        # longer.
         open_ = [row for row in self.whole if not busy & set(row[0])]
         first = next((row for row in open_ if self._lost(row[0]) > LOST_BY[row[1]]), None)
         if first is not None:

@@ -208,8 +208,7 @@ class _VehicleDrive:
     def drive(self, now: FleetStep, step: float, number: int, noise: Array) -> Plan:
         """Drive what a step says from where the vehicle is, until the next one; what was driven."""
         problem = self.vehicle.problem
-        until = now.time + step
-        piece = now.piece_of(self.vehicle.name, self.pose, until, problem.automaton.model)
+        piece = now.piece_of(self.vehicle.name, self.pose, now.time + step, problem.automaton.model)
         if piece.trims:
             self.cost += problem.cost_of(piece)
         piece = as_driven(piece, self.upset)
@@ -338,8 +337,7 @@ class _FleetWorld:
 
     def log(self) -> FleetLog:
         """The log of all steps."""
-        names = {one.vehicle.name for one in self.drives}
-        left = names - set(self.arrived_s) - self.broken
+        left = {one.vehicle.name for one in self.drives} - set(self.arrived_s) - self.broken
         status, reason = "reached", ""
         of_loop = self.loop.state.settings.workers
         workers = {} if of_loop is None else of_loop.counts

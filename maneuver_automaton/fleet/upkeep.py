@@ -234,8 +234,7 @@ def back_onto(
         return None
     if left.start_time + left.duration <= time + step + NOTHING:
         return plan
-    cut = with_samples_at(left, [time + step], model)
-    rest = tail_of(cut, time + step - left.start_time)
+    rest = tail_of(with_samples_at(left, [time + step], model), time + step - left.start_time)
     return replace(
         plan,
         trims=(*plan.trims, *rest.trims),
@@ -262,8 +261,7 @@ def _pairs(
         order = np.argsort(off[rows, columns], kind="stable")[:kept]
         first, second = first[order], second[order]
         middle, near = shares[rows[order], columns[order]], near / (0.5 * SWITCHES)
-    switches = (step * middle).tolist()
-    return list(zip(first.tolist(), second.tolist(), switches, strict=True))
+    return list(zip(first.tolist(), second.tolist(), (step * middle).tolist(), strict=True))
 
 
 def _poses(plan: Plan, times: ArrayLike) -> Array:
@@ -356,8 +354,7 @@ def _another(now: Moment, k: int, waiting: Sequence[int]) -> OwnPlan | None:
         found = search(now, k, now.from_here(k, pose), past, math.inf, most=LONG)[0]
         if found is not None and now.is_proven(k, found, past):
             return found
-        stops = [(j, now.stopping(j)) for j in waiting]
-        past = [*now.expected_by(k, but=waiting), *stops]
+        past = [*now.expected_by(k, but=waiting), *[(j, now.stopping(j)) for j in waiting]]
     return None
 
 

@@ -383,9 +383,7 @@ class FleetMember:
             return None
         if schedule is not None:
             best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
-        if not best.cost < known:
-            return None
-        return self._word_found(query, best, aims)
+        return self._word_found(query, best, aims) if best.cost < known else None
 
     def leg(
         self,
@@ -416,8 +414,7 @@ class FleetMember:
             most = max(most, LONG)
             return self._found(self._planned(past, budget, improve=False, most=most))
         query = self._query(past)
-        schedule = replace(AT_ONCE, most=most)
-        found = words_of(query, budget=budget, schedule=schedule).to_the_end()
+        found = words_of(query, budget=budget, schedule=replace(AT_ONCE, most=most)).to_the_end()
         self.expansions += found.first.expansions if found.first else 0
         return None if found.word is NO_WORD else self._word_found(query, found.word, aims)
 
@@ -502,8 +499,7 @@ class FleetMember:
         else:
             workspace = Workspace(problem.obstacles, self.workspace.prepared)
         wanted = replace(problem, search=search)
-        limit = max(budget.left, LEAST_S)
-        result = plan_in(workspace, wanted, time_limit=limit, alternatives=0)
+        result = plan_in(workspace, wanted, time_limit=max(budget.left, LEAST_S), alternatives=0)
         self.expansions += result.counts.get("expansions", 0)
         return result
 
@@ -550,10 +546,9 @@ def vehicles_of(fleet: FleetProblem, prepared: Prepared | None = None) -> list[F
     """The vehicles of a fleet, which share what is prepared: anew, or with others."""
     prepared = Prepared() if prepared is None else prepared
     workspaces: dict[tuple[int, ...], Workspace] = {}
-    keeps = [problem.margin for problem in fleet.problems]
     # Every search keeps its own margin from what it must not touch: what that lacks of the fleet's,
     # the others are larger by.
-    grown = max(fleet.margin - min(keeps), 0.0)
+    grown = max(fleet.margin - min(problem.margin for problem in fleet.problems), 0.0)
     vehicles = []
     for k, problem in enumerate(fleet.problems):
         key = tuple(map(id, problem.obstacles))

@@ -155,8 +155,7 @@ def measured(
         least = known.get(both)
         if least is None:
             least = known[both] = nearest(*both, enough=enough_for(keep))
-        pair = names[meeting.one], names[meeting.other]
-        rows.append(Closest(pair, least.time, least.distance))
+        rows.append(Closest((names[meeting.one], names[meeting.other]), least.time, least.distance))
     return tuple(sorted(rows, key=lambda row: row.distance_m))
 
 
@@ -170,8 +169,7 @@ def nearest(one: FleetCourse, other: FleetCourse, *, enough: float = 0.0) -> Lea
     if len(other.bands) > len(one.bands):
         one, other = other, one
     pairs = [(one, other), (other, one)] if len(other.bands) > 1 else [(one, other)]
-    found = [_nearest(*pair, enough=enough) for pair in pairs]
-    return max(found, key=lambda least: least.distance)
+    return max((_nearest(*pair, enough=enough) for pair in pairs), key=lambda least: least.distance)
 
 
 def _nearest(one: FleetCourse, other: FleetCourse, *, enough: float) -> Least:
@@ -250,8 +248,7 @@ def plan_of_motion(
     start = motion.pose[0]
     if levels is not None:
         altitudes = levels.at(motion.time)
-        climbs = np.diff(altitudes) / np.diff(motion.time)
-        twists = np.column_stack([twists, [0.0, *climbs, 0.0]])
+        twists = np.column_stack([twists, [0.0, *(np.diff(altitudes) / np.diff(motion.time)), 0.0]])
         start = np.append(start, altitudes[0])
     trims = tuple(
         Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)

@@ -60,8 +60,7 @@ def decoded(vehicle: FleetMember, message: bytes) -> OwnPlan:
         sent, cost, goal_index, stays = pickle.loads(message)
     except (pickle.UnpicklingError, EOFError) as error:
         raise ValueError(f"plan of {vehicle.name!r}: a message is cut off ({error})") from error
-    plan = unpacked(sent, vehicle.problem.automaton)
-    found = vehicle.own(plan, goal_index, cost=cost)
+    found = vehicle.own(unpacked(sent, vehicle.problem.automaton), goal_index, cost=cost)
     return replace(found, course=found.course.staying) if stays else found
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad_rules import (
@@ -269,8 +270,6 @@ def _corners(shape: Shape) -> Array:
 
 
 def _convex(points: Array, grown: float = 0.0) -> Polygon:
-    import shapely
-
     hull = shapely.convex_hull(shapely.MultiPoint(points))
     outline = shapely.buffer(hull, grown, join_style="mitre") if grown else hull
     return Polygon(shapely.get_coordinates(outline.exterior)[:-1])

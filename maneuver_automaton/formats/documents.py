@@ -264,8 +264,7 @@ def _needed(schema: Mapping[str, Any], where: tuple[str | int, ...]) -> str:
 
 def document_of(form: type[T], value: Any, /, **given: Any) -> T:
     """What a file says of a value, by the keys of its kind; see `entry`."""
-    head = {"schema": SCHEMA, "version": package_version()}
-    said = entry(form, value, **head, **given)
+    said = entry(form, value, schema=SCHEMA, version=package_version(), **given)
     assert isinstance(said, dict)
     return cast("T", {key: said[key] for key in (*HEAD, "notes", *said) if key in said})
 

@@ -321,5 +321,4 @@ def _obstacle(document: Document, k: int) -> Obstacle:
     if kind != "box":
         raise document.error((*where, "type"), f"got {shown(kind)}, need box")
     center = numbers_at(document, (*where, "center"), 2, "[x, y]")
-    size = sizes_at(document, (*where, "size"))
-    return Obstacle(Box(size, center), name=f"obstacle {k + 1}")
+    return Obstacle(Box(sizes_at(document, (*where, "size")), center), name=f"obstacle {k + 1}")

@@ -111,8 +111,8 @@ def entry(form: type[T], value: Any, /, **given: Any) -> T:
             row[key.name] = _stated(given[key.name], key.hint)
         elif value is None:
             row |= {key.name: None} if key.needed else {}
-        elif (name := _first(key, value)) or key.needed:
-            row[key.name] = _stated(getattr(value, name or key.name), key.hint)
+        elif (its := [one for one in key.attributes if hasattr(value, one)]) or key.needed:
+            row[key.name] = _stated(getattr(value, its[0] if its else key.name), key.hint)
     return cast("T", row)
 
 
@@ -136,10 +136,6 @@ def made(kind: type[T], row: Mapping[str, Any], form: Any, /, **given: Any) -> T
 
 
 _types_of = functools.cache(get_type_hints)
-
-
-def _first(key: Key, value: Any) -> str | None:
-    return next((one for one in key.attributes if hasattr(value, one)), None)
 
 
 def _options(hint: Any) -> Iterator[Any]:

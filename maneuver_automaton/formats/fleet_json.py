@@ -126,8 +126,7 @@ def save_fleet(
     OSError
         If the file cannot be written.
     """
-    document = fleet_to_dict(result, name=name)
-    write_document(document, path, source=source, interrupted=interrupted)
+    write_document(fleet_to_dict(result, name=name), path, source=source, interrupted=interrupted)
 
 
 def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:

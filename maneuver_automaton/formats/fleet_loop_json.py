@@ -350,8 +350,7 @@ def _did(rows: Sequence[Row], automaton: Automaton) -> dict[int, tuple[Row, Plan
         if held is None:
             raise ValueError(f"steps: holds no plan at {row['time_s']:g} s")
         start, time = _pose(row["pose"], automaton), float(row["plan_time_s"])
-        plan = plan_of(start, time, row["plan"], automaton)
-        found[int(row["number"])] = (row, held, plan)
+        found[int(row["number"])] = (row, held, plan_of(start, time, row["plan"], automaton))
     return found
 
 
@@ -380,7 +379,6 @@ def _step_of(
             f"vehicles.{late[0]}: step {number} is at {own[late[0]]['time_s']:g} s, "
             f"need {row['time_s']:g} s"
         )
-    swaps = (made(Swap, one, SwapEntry, order=k) for k, one in enumerate(row["swaps"]))
     return made(
         FleetStep,
         row,
@@ -391,5 +389,5 @@ def _step_of(
         values={name: or_inf(its["value"]) for name, its in own.items()},
         arrivals={name: or_inf(its["arrival_s"]) for name, its in own.items()},
         off_plan={name: float(its["off_plan_m"]) for name, its in own.items()},
-        swaps=tuple(swaps),
+        swaps=tuple(made(Swap, one, SwapEntry, order=k) for k, one in enumerate(row["swaps"])),
     )

@@ -88,10 +88,9 @@ def automaton_of_lattice(
     counts = [0] * len(trims)
     maneuvers = []
     for move in lattice.moves:
-        course = _course(move, speed, turn_rate)
         maneuvers.append(
             Maneuver.along(
-                course,
+                _course(move, speed, turn_rate),
                 name=f"{counts[move.start]} from heading {move.start}",
                 source=trims[move.start].name,
                 target=trims[move.end].name,
@@ -119,11 +118,10 @@ def lattice_of_automaton(automaton: Automaton, *, kind: str) -> Lattice:
                 f"trim {trim.name!r}: a file of {kind} has headings only, need trims at rest, "
                 "counter-clockwise from the x axis"
             )
-    moves = tuple(_move(automaton, maneuver, headings, kind) for maneuver in automaton.maneuvers)
     return Lattice(
         resolution=body.resolution,
         headings=headings,
-        moves=moves,
+        moves=tuple(_move(automaton, maneuver, headings, kind) for maneuver in automaton.maneuvers),
         turning_radius=body.turning_radius,
         name=automaton.name,
     )
@@ -171,16 +169,13 @@ def _twists(poses: Array) -> Array:
 
 def _course(move: Move, speed: float, turn_rate: float) -> Trajectory:
     """The motion from pose to pose, seen from the first one."""
-    poses = move.poses
-    moving = np.append(True, np.any(np.diff(poses, axis=0) != 0.0, axis=1))
-    poses = poses[moving]
+    poses = move.poses[np.append(True, np.any(np.diff(move.poses, axis=0) != 0.0, axis=1))]
     steps = _twists(poses)
     spans = np.maximum(np.hypot(steps[:, 0], steps[:, 1]) / speed, np.abs(steps[:, 2]) / turn_rate)
     control = steps / np.where(spans > 0.0, spans, 1.0)[:, None]
-    seen = (SE2(poses[0]).inverse() @ SE2(poses)).pose + 0.0
     return Trajectory(
         time=np.append(0.0, np.cumsum(spans)),
-        pose=seen,
+        pose=(SE2(poses[0]).inverse() @ SE2(poses)).pose + 0.0,
         reduced_state=np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], axis=-1),
         control=np.concatenate([control, control[-1:] if len(control) else np.zeros((1, 3))]),
     )

@@ -72,8 +72,7 @@ def _read(path: Path, model: Model | None) -> PrimitivesRead | None:
         remark = str(commonroad_primitives.deviation_of(file, automaton))
     elif ending == JSON and _is_nav2(path):
         kind, file = "Nav2", nav2_lattice.read_nav2_lattice(path)
-        name = path.name.split(".json")[0]
-        automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=name)
+        automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=path.name.split(".json")[0])
     else:
         return None
     return PrimitivesRead(kind=kind, file=file, automaton=automaton, remark=remark)

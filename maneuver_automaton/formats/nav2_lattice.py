@@ -147,8 +147,7 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2File:
     label = automaton.name or "automaton"
     moves = []
     for maneuver, move in zip(automaton.maneuvers, lattice.moves, strict=True):
-        forward = _along(move)[0]
-        if forward < -SIDEWAYS:
+        if _along(move)[0] < -SIDEWAYS:
             raise InvalidLibrary(
                 f"maneuver {maneuver.name!r}: drives in reverse, but a file of {KIND} has forward "
                 "motion only: Nav2 drives the primitives of the opposite heading backwards"
@@ -263,8 +262,7 @@ def _meant(head: Nav2Head, row: Nav2Row) -> Move:
 def _described(number: int, move: Move) -> Nav2Row:
     """A primitive with what its poses say of it."""
     radius, arc, straight = arcs(move.poses)
-    moves = move.poses[:, :2].any()
-    poses = move.poses[1:] if moves else move.poses
+    poses = move.poses[1:] if move.poses[:, :2].any() else move.poses
     return {
         "trajectory_id": number,
         "start_angle_index": move.start,
@@ -291,5 +289,4 @@ def _along(move: Move) -> tuple[float, float]:
 def _motion(moves: Sequence[Move]) -> str:
     if any(abs(_along(move)[1]) > SIDEWAYS for move in moves):
         return "omni"
-    turns = any(not move.poses[:, :2].any() for move in moves)
-    return "diff" if turns else "ackermann"
+    return "diff" if any(not move.poses[:, :2].any() for move in moves) else "ackermann"

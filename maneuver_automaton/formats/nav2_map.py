@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import OccupancyMap, Polygon
 from maneuver_automaton.collision.outline import united
@@ -83,8 +84,6 @@ class Mask(NamedTuple):
 
     def regions(self) -> list[tuple[int, Polygon]]:
         """Connected cells of one value above 0, each with the polygon that is their union."""
-        import shapely
-
         found = []
         for value in np.unique(self.values[self.values > 0]).tolist():
             cells = OccupancyMap(self.values == value, resolution=1.0)
@@ -284,8 +283,7 @@ def _binary(path: Path, body: bytes, n: int, greatest: int) -> NDArray[np.uint16
         raise InvalidScenario(
             f"{path}: got {len(body)} bytes of pixels, need {n * size}: the rest belongs to nothing"
         )
-    values = np.frombuffer(body[: n * size], dtype=np.uint8 if size == 1 else ">u2")
-    return values.astype(np.uint16)
+    return np.frombuffer(body[: n * size], dtype=np.uint8 if size == 1 else ">u2").astype(np.uint16)
 
 
 def _plain(path: Path, body: bytes, n: int, greatest: int) -> NDArray[np.uint16]:

@@ -268,8 +268,7 @@ def trajectory_entry(plan: Plan | None) -> TrajectoryEntry:
     samples = plan.sample()
     if np.abs(samples.pose[:, :2]).max() > FAR:
         origin = plan.start[:2]
-        start = np.concatenate([np.zeros(2), plan.start[2:]])
-        samples = replace(plan, start=start).sample()
+        samples = replace(plan, start=np.concatenate([np.zeros(2), plan.start[2:]])).sample()
     return {
         "origin": origin.tolist(),
         "time_s": samples.time.tolist(),
@@ -536,11 +535,9 @@ def _twist(time: Array, pose: Array) -> Array:
     span = float(time[-1] - time[0])
     if span <= 0.0:
         return np.zeros(group.dof)
-    turned = np.abs(pose[:, 2] - pose[0, 2])
-    last = int(np.flatnonzero(turned < np.pi)[-1])
+    last = int(np.flatnonzero(np.abs(pose[:, 2] - pose[0, 2]) < np.pi)[-1])
     if last == 0:
         raise ValueError("trajectory: two samples of a trim are half a turn apart, need more")
-    motion = group(pose[0]).inverse() @ group(pose[last])
-    twist = motion.log() / (time[last] - time[0])
+    twist = (group(pose[0]).inverse() @ group(pose[last])).log() / (time[last] - time[0])
     twist[2] = (pose[-1, 2] - pose[0, 2]) / span  # the longer stretch says it better
     return np.asarray(twist, dtype=np.float64)

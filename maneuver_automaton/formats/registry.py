@@ -89,8 +89,7 @@ class BuiltIn:
 
     def call(self, function: str, *given: Any) -> Any:
         """What a function of its module returns."""
-        module = importlib.import_module(f"{__package__}.{self.module}")
-        return getattr(module, function)(*given)
+        return getattr(importlib.import_module(f"{__package__}.{self.module}"), function)(*given)
 
 
 YAML, CSV = " ".join(YAML_ENDINGS), ".csv"
@@ -196,8 +195,7 @@ def map_writer_of(path: Path) -> FileFormat | None:
 
 def states_a_problem(path: Path, document: Document | None) -> bool:
     """Whether a file of a folder is a problem by itself; a damaged one is, which then tells why."""
-    ending = path.suffix.lower()
-    if ending in YAML_ENDINGS:
+    if path.suffix.lower() in YAML_ENDINGS:
         return document is None or not belongs_to(document)
     try:
         return any(one.recognises(path, None) for one in (*from_outside(), *BUILT_IN))

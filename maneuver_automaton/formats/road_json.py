@@ -144,12 +144,11 @@ class RoadFleetDriveDocument(SeveralEntry):
 def road_plan_to_dict(result: RoadPlanResult) -> RoadPlanDocument:
     """The content of plan.json; without a plan the numbers are null and the lists empty."""
     plan, verdict = result.plan, result.verdict
-    unknown = ("lower_bound", "bound", "gap", "certificate", "terminal_error")
     return document_of(
         RoadPlanDocument,
         result,
         **_library(result.planner),
-        **dict.fromkeys(unknown),
+        **dict.fromkeys(("lower_bound", "bound", "gap", "certificate", "terminal_error")),
         status="no_plan" if plan is None else "found",
         duration_s=None if plan is None else plan.duration,
         primitives=_primitives(plan),

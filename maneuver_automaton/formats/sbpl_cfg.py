@@ -152,5 +152,4 @@ def _end(
         if value >= size:
             raise InvalidScenario(f"{at}: got {value}, need 0 to {size - 1}, a cell of the map")
         middle.append(value + 0.5)
-    heading = drawn_headings(0)[0 if what == "start" else 1]
-    return np.array([*middle, heading])
+    return np.array([*middle, drawn_headings(0)[0 if what == "start" else 1]])

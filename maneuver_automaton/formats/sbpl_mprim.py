@@ -109,8 +109,7 @@ class _Words:
         return self
 
     def finite(self, what: str) -> float:
-        word = self.next(what)
-        return finite(word, at=f"{self.path}:{self.line}: {what.rstrip(':')}")
+        return finite(self.next(what), at=f"{self.path}:{self.line}: {what.rstrip(':')}")
 
     def positive(self, what: str) -> float:
         value = self.finite(what)
@@ -130,9 +129,7 @@ def read_mprim(path: Path) -> MprimFile:
     """The primitives of a file, as they stand there."""
     words = _Words(path)
     resolution = words.key(RESOLUTION).positive(RESOLUTION)
-    radius = None
-    if words.peek() == RADIUS:
-        radius = words.key(RADIUS).positive(RADIUS)
+    radius = words.key(RADIUS).positive(RADIUS) if words.peek() == RADIUS else None
     n_angles = words.key(ANGLES).whole(ANGLES, least=1)
     headings = 2.0 * np.pi * np.arange(n_angles) / n_angles
     if radius is not None:
@@ -273,9 +270,7 @@ def _primitive(
     column, row = (words.whole(END, least=-(2**31)) for _ in range(2))
     end = (column, row, words.whole(END, least=-headings.size))
     multiplier = words.key(MULTIPLIER).whole(MULTIPLIER)
-    own = None
-    if radius is not None:
-        own = words.key(PRIMITIVE_RADIUS).finite(PRIMITIVE_RADIUS)
+    own = None if radius is None else words.key(PRIMITIVE_RADIUS).finite(PRIMITIVE_RADIUS)
     count = words.key(POSES).whole(POSES, least=1)
     poses: list[list[float]] = []
     first = words.line

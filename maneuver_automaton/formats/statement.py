@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap, Polygon, Shape
 from maneuver_automaton.errors import InvalidScenario
@@ -111,8 +112,6 @@ _PLACE = re.compile(r"(.*)\[(\S+) (\S+)\]")
 def simple_polygon(corners: ArrayLike, holes: Sequence[ArrayLike] = ()) -> Polygon:
     """A polygon of rings as a file lists them; corners that are listed twice count once."""
     rings = [_ring(corners, "the ring"), *(_ring(hole, "a hole") for hole in holes)]
-    import shapely
-
     polygon = shapely.Polygon(rings[0], rings[1:])
     if not polygon.is_valid:
         raise ValueError(_words(shapely.is_valid_reason(polygon)))

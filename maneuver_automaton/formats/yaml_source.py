@@ -171,7 +171,8 @@ class _Builder:
         elif isinstance(event, yaml.SequenceStartEvent | yaml.MappingStartEvent):
             self._begin(event, line)
         elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
-            self._end()
+            done = self.stack.pop()
+            self._add(done.value, done.line, done.anchor, self.nodes - done.nodes_before)
 
     def _begin(self, event: Any, line: int) -> None:
         self._refuse_tag(event, line)
@@ -182,10 +183,6 @@ class _Builder:
         value: Any = [] if isinstance(event, yaml.SequenceStartEvent) else {}
         self.stack.append(_Unfinished(value, self._next_place(), line, event.anchor, self.nodes))
         self.nodes += 1
-
-    def _end(self) -> None:
-        done = self.stack.pop()
-        self._add(done.value, done.line, done.anchor, self.nodes - done.nodes_before)
 
     def _expand(self, anchor: str, line: int) -> None:
         if anchor not in self.anchors:

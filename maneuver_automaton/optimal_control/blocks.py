@@ -108,8 +108,7 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
     """The program of `size` variables and so many parameters that blocks add up to."""
     x, p = casadi.MX.sym("x", size), casadi.MX.sym("p", given)
     limits = np.concatenate([np.tile(one.kind.limits, (one.number, 1)) for one in blocks])
-    number = len(limits)
-    of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", number)
+    of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", len(limits))
     price, rows, entries, curves = casadi.MX(0.0), [], [], []
     of_entries, of_curves = list[IntArray](), list[IntArray]()  # (2, n) row and column of each
     first = 0

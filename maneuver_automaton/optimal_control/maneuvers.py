@@ -215,13 +215,12 @@ def transfer_program(
     x = casadi.vertcat(*(part for stage in stages for part in stage), begins[-1])
     functions = {"x": x, "f": cost, "g": casadi.vertcat(*g), "p": ends}
 
-    solver = casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
     return TransferProgram(
         model=model,
         objective=objective,
         settings=settings,
         equality=tuple(equality),
-        solver=solver,
+        solver=casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver)),
         build_s=time.perf_counter() - began,
     )
 
@@ -380,8 +379,7 @@ def duration_guess(model: Model, start: Array, end: Array) -> float:
     controls = np.array(list(itertools.product(*corners)))
     states = np.repeat([start, (start + end) / 2.0, end], len(controls), axis=0)
     fastest = np.abs(model.reduced_dynamics(states, np.tile(controls, (3, 1)))).max(axis=0)
-    change = np.abs(end - start)
-    seconds = change / np.where(fastest > 0.0, fastest, np.inf)
+    seconds = np.abs(end - start) / np.where(fastest > 0.0, fastest, np.inf)
     return max(LEAST_GUESS_S, 1.5 * float(seconds.max(initial=0.0)))
 
 

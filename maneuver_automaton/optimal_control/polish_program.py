@@ -69,8 +69,7 @@ def paths(
             x_1, y_1, v_1, w_1 = _corners(casadi, part, corners, end)
             third = casadi.repmat(step / 3.0, len(corners), 1)
             x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
-            y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
-            found.append(Paths(x, y))
+            found.append(Paths(x, casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)))
     return found
 
 
@@ -228,8 +227,7 @@ def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Block
     blocks = []
     for guard, which in zip(program.scene.guards, held, strict=False):
         if len(which):
-            limits = guard._replace(solids=None)
-            given = (program.model, limits, weight, program.paced)
+            given = (program.model, guard._replace(solids=None), weight, program.paced)
             kind = _guard_kind(*given)  # type: ignore[arg-type]  # values all
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
@@ -261,10 +259,8 @@ def place_blocks(program: PolishProgram, first: int) -> list[Blocks]:
 
 @functools.lru_cache(maxsize=16)
 def _guard_kind(model: Model, guard: Guard, tightening: float, paced: bool) -> Kind:
-    """One interval within the limits of a guard; the node where all begins gets no room.
-
-    The control points of the cubics with the same values and rates at both nodes keep them.
-    """
+    """One interval within the limits of a guard; the node where all begins gets no room."""
+    # The control points of the cubics with the same values and rates at both nodes keep them.
     casadi = load_casadi()
     dof, own = model.group.dof, len(model.control_names)
     n_x = dof + len(model.reduced_names)
@@ -401,10 +397,8 @@ def _path(model: Model, scene: PolishScene) -> Any:
 def _between(
     model: Model, begin: NodeMotion, end: NodeMotion, *, step: Any, settings: PolishSettings
 ) -> list[tuple[Any, float, float]]:
-    """What keeps reduced states inside their limits between nodes, where they do not run straight.
-
-    The control points of the cubic with the same values and rates at both nodes are kept inside.
-    """
+    """Keeps reduced states inside their limits between nodes where they do not run straight."""
+    # The control points of the cubic with the same values and rates at both nodes are kept inside.
     rows = []
     limits = _tight(model, settings)
     for k in _curved(model):
@@ -485,12 +479,11 @@ def _frames(casadi: Any, model: Model, state: Any, control: Any) -> NodeMotion:
     dof = model.group.dof
     z, u = casadi.vertsplit(state[dof:, :]), casadi.vertsplit(control)
     ones = casadi.SX.ones(1, state.shape[1])
-    rates = [casadi.SX(rate) * ones for rate in model.dynamics(z, u)]
     return NodeMotion(
         pose=state[:dof, :],
         twist=[casadi.SX(v) * ones for v in model.velocity(z, u)],
         reduced=state[dof:, :],
-        reduced_rates=casadi.vertcat(*rates),
+        reduced_rates=casadi.vertcat(*[casadi.SX(rate) * ones for rate in model.dynamics(z, u)]),
     )
 
 
@@ -502,5 +495,4 @@ def _ends_in_rates(model: Model) -> list[int]:
     with numpy_on_symbols(casadi):
         velocity = model.velocity(casadi.vertsplit(z), casadi.vertsplit(u))
     twist = casadi.vertcat(*(casadi.SX(v) for v in velocity))
-    depends = casadi.which_depends(twist, u, 1, False)
-    return [k for k, used in enumerate(depends) if not used]
+    return [k for k, used in enumerate(casadi.which_depends(twist, u, 1, False)) if not used]

@@ -162,11 +162,9 @@ class CornerPlaces(NamedTuple):
 
 
 def _corners(program: PolishProgram, point: Point, parting: Parting) -> tuple[Array, CornerPlaces]:
-    """Parameters of corners of both sides, and where those of each solid begin.
-
-    Of the pieces only those that are in pairs: a map may have thousands. A corner that shifts is
-    where it would be if the motion took no time, and shifts with the duration from there.
-    """
+    """Parameters of corners of both sides, and where those of each solid begin."""
+    # Of the pieces only those that are in pairs: a map may have thousands. A corner that shifts is
+    # where it would be if the motion took no time, and shifts with the duration from there.
     body, pieces = program.scene.body, program.pieces(point)
     used, owner = np.unique(parting.pairs.piece, return_inverse=True)
     moving = used >= pieces.first
@@ -486,7 +484,8 @@ def polish(
     via = [(node, settled_state(state)) for node, state in via]
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
     program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
-    ahead = settings.ahead * _fastest(point)
+    lengths = np.hypot(*np.diff(point.state[:, :2], axis=0).T)
+    ahead = settings.ahead * float((lengths / point.durations).max(initial=0.0))  # at the fastest
     reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
     near = max(settings.near * reach, ahead)
     apart = parted(program, point, pairs_near(program, point, near))
@@ -598,12 +597,6 @@ def intervals_for(duration: float) -> int:
     """How many intervals a motion of a duration [s] gets."""
     fewest, most = USUAL.nodes
     return min(max(math.ceil(duration / USUAL.step), fewest), most)
-
-
-def _fastest(point: Point) -> float:
-    """Greatest speed of the reference point from node to node [m/s]."""
-    steps = np.hypot(*np.diff(point.state[:, :2], axis=0).T)
-    return float((steps / point.durations).max(initial=0.0))
 
 
 def _nothing(reason: str) -> SolverAnswer:

@@ -126,8 +126,7 @@ def pieces_during(
         solids += list(zip(both, bulges.tolist(), strict=True))
         there = (clock[:-1] <= last) & (clock[1:] >= first)
         intervals.append(np.where(there, np.arange(len(durations)), NEVER))
-        pad = most - rates.shape[1]
-        shifts.append(np.pad(settled(rates), ((0, 0), (0, pad), (0, 0))))
+        shifts.append(np.pad(settled(rates), ((0, 0), (0, most - rates.shape[1]), (0, 0))))
     return ObstaclePieces(
         solids,
         np.concatenate(intervals).astype(np.int64),
@@ -155,8 +154,7 @@ def _bulges(one: MovingSolid, begin: Array, end: Array) -> Array:
     here, there = _corners(one, begin), _corners(one, end)
     most = np.zeros(len(begin))
     for share in INSIDE:
-        chord = here + share * (there - here)
-        gap = _corners(one, begin + share * (end - begin)) - chord
+        gap = _corners(one, begin + share * (end - begin)) - (here + share * (there - here))
         most = np.maximum(most, np.hypot(gap[..., 0], gap[..., 1]).max(axis=1))
     return most
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.optimal_control.polish_program import PolishProgram
 from maneuver_automaton.optimal_control.scene import ALWAYS, Point, Solid
 
@@ -69,8 +70,6 @@ class Lines(NamedTuple):
 
 def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPairs:
     """Pairs that are nearer than `within` [m] at a point, from control points in numbers."""
-    import shapely
-
     pieces, body = program.pieces(point), program.scene.body
     if not (pieces.solids and body):
         empty = np.zeros(0, dtype=np.int64)
@@ -98,8 +97,6 @@ def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPair
 
 def first_lines(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
     """Lines midway between nearest points; of solids that overlap, along the least penetration."""
-    import shapely
-
     if not len(pairs.piece):
         return Lines(np.zeros(0), np.zeros((0, 2)))
     pieces = program.pieces(point).solids
@@ -143,15 +140,13 @@ def reaches(
         columns = pairs.interval[which]
         along = normal[which, 0] * (x[:, columns] - lines.anchor[which, 0])
         along += normal[which, 1] * (y[:, columns] - lines.anchor[which, 1])
-        half = len(along) // 2
-        nodes[which] = along[:half].max(axis=0) + body[number][1]
+        nodes[which] = along[: len(along) // 2].max(axis=0) + body[number][1]
         between[which] = along.max(axis=0) + body[number][1]
     if not len(normal):
         return Reach(nodes, between, np.zeros(0))
     corners, rounding = _padded(pieces, pairs.piece)
     there = corners - lines.anchor[:, None]
-    begin = np.einsum("nkd,nd->nk", there, normal).min(axis=1) - rounding
-    return Reach(nodes, between, begin)
+    return Reach(nodes, between, np.einsum("nkd,nd->nk", there, normal).min(axis=1) - rounding)
 
 
 def shared_lines(
@@ -240,8 +235,7 @@ def facing(
             columns = pairs.interval[which]
             rows = slice(node * m, (node + 1) * m)
             along = c[which] * x[rows, columns].T[:, None] + s[which] * y[rows, columns].T[:, None]
-            foremost = along.argmax(axis=2)
-            here[which[:, None], node, foremost] = True
+            here[which[:, None], node, along.argmax(axis=2)] = True
     if not count:
         return Facing(here, np.zeros((0, 0), dtype=np.bool_))
     corners, rounding = _padded(pieces, pairs.piece)
@@ -258,8 +252,6 @@ def facing(
 
 def _geometries(rings: Sequence[Array]) -> Any:
     """Hulls (n,) of corners in any order: points, edges and polygons, of as many at once."""
-    import shapely
-
     counts = np.array([len(ring) for ring in rings])
     found = np.empty(len(rings), dtype=object)
     for count in np.unique(counts).tolist():
@@ -273,8 +265,6 @@ def _geometries(rings: Sequence[Array]) -> Any:
 
 
 def _hulls(x: Array, y: Array) -> Any:
-    import shapely
-
     return shapely.convex_hull(shapely.linestrings(np.stack([x.T, y.T], axis=-1)))
 
 
@@ -331,8 +321,7 @@ class Parting(NamedTuple):
 
     def binding(self, program: PolishProgram, point: Point, tight: float) -> int:
         """How many lines that stand still at the pieces hold the body back, nearer than so [m]."""
-        reach = self._reach(program, point)
-        return int(np.count_nonzero(reach.nodes + self.margins > -tight))
+        return int(np.count_nonzero(self._reach(program, point).nodes + self.margins > -tight))
 
     def with_margins(self, program: PolishProgram, point: Point, *, fixed: bool) -> Parting:
         """With room for what corners swing out between nodes; `fixed` lines touch the pieces."""
@@ -348,8 +337,7 @@ class Parting(NamedTuple):
         """With its own lines at other angles, and moved along their normals by offsets."""
         slot = np.cumsum(self.owner == np.arange(len(self.owner))) - 1
         mine = slot[self.owner]
-        lines = Lines(angle[mine], self.lines.anchor).shifted(offset[mine])
-        return self._replace(lines=lines)
+        return self._replace(lines=Lines(angle[mine], self.lines.anchor).shifted(offset[mine]))
 
     def joined(self, program: PolishProgram, point: Point, others: SolidPairs) -> Parting:
         """With the pairs that were not among them, parted by lines of their own."""
@@ -386,8 +374,7 @@ class Parting(NamedTuple):
         return self if self.facing.holds(now) else self._refaced(program, point)
 
     def _refaced(self, program: PolishProgram, point: Point) -> Parting:
-        now = self._facing(program, point, TURNED)
-        return self._replace(facing=now.joined(self.facing))
+        return self._replace(facing=self._facing(program, point, TURNED).joined(self.facing))
 
     def _facing(self, program: PolishProgram, point: Point, turned: Array) -> Facing:
         points, both = program.points(point), _both(program, point)
@@ -401,8 +388,7 @@ def parted(program: PolishProgram, point: Point, pairs: SolidPairs) -> Parting:
     """Pairs with first lines at a point, of which pieces behind one another share one."""
     lines = first_lines(program, point, pairs)
     points, both = program.points(point), _both(program, point)
-    reach = reaches(points, both, pairs, lines)
-    owner = shared_lines(both[1], pairs, lines, reach)
+    owner = shared_lines(both[1], pairs, lines, reaches(points, both, pairs, lines))
     lines = lines.of(owner)
     faces = facing(points, both, pairs, lines, owner, turned=TURNED)
     return Parting(pairs, owner, lines, np.zeros(len(owner)), faces)
@@ -429,6 +415,5 @@ def held_near(program: PolishProgram, point: Point, within: float) -> list[IntAr
     steps = np.hypot(*np.diff(places, axis=0).T)
     for a, b, c in program.scene.walls:
         room = c - places @ np.array([a, b])
-        near = np.minimum(room[:-1], room[1:]) < within + FURTHER * steps
-        found.append(np.flatnonzero(near))
+        found.append(np.flatnonzero(np.minimum(room[:-1], room[1:]) < within + FURTHER * steps))
     return found

@@ -75,15 +75,14 @@ def evaluate(
 
     Nothing of the solver is used: the functions of the problem are called on arrays.
     """
-    integrands = [problem.stage_cost or _nothing, *problem.integrals.values()]
+    integrands = [problem.stage_cost or (lambda x, u: 0.0), *problem.integrals.values()]
     n_states = problem.n_states
 
     def field(x: Array, u: Array) -> Array:
         count = x.shape[1]
         xs, us = list(x), list(u)
         rates = [*problem.dynamics(xs, us), *(integrand(xs, us) for integrand in integrands)]
-        rows = [np.broadcast_to(row, (count,)) for row in rates]
-        return np.array(rows, dtype=np.float64)
+        return np.array([np.broadcast_to(row, (count,)) for row in rates], dtype=np.float64)
 
     inputs = np.repeat(control, grid.held, axis=0).T
     step = duration / (grid.n_nodes - 1)
@@ -97,10 +96,6 @@ def evaluate(
         worst_defect=_largest(np.abs(defects)),
         worst_violation=_violation(problem, state, control, duration),
     )
-
-
-def _nothing(x: Sequence[Any], u: Sequence[Any]) -> float:
-    return 0.0
 
 
 def _violation(
@@ -194,7 +189,6 @@ def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
             objective += casadi.sum2(added[n_states:, :])
         if problem.terminal_cost is not None:
             objective += problem.terminal_cost(casadi.vertsplit(state[:, n - 1]))
-    defects = casadi.vec(state[:, : n - 1] + added[:n_states, :] - state[:, 1:])
     return Transcription(
         problem=problem,
         grid=grid,
@@ -203,7 +197,7 @@ def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
         duration=duration,
         objective=objective,
         inputs=inputs,
-        constraints=defects,
+        constraints=casadi.vec(state[:, : n - 1] + added[:n_states, :] - state[:, 1:]),
         limits=np.zeros((n_states * (n - 1), 2)),
         bounds=bounds_of(problem, grid),
     )
@@ -313,8 +307,7 @@ def unpacked(
     """States (n, n_x), controls (m, n_u) and duration from the values of all variables."""
     split = grid.n_nodes * problem.n_states
     state = values[:split].reshape(grid.n_nodes, problem.n_states)
-    control = values[split:-1].reshape(grid.n_controls, problem.n_controls)
-    return state, control, float(values[-1])
+    return state, values[split:-1].reshape(grid.n_controls, problem.n_controls), float(values[-1])
 
 
 def bounds_of(problem: OptimalControlProblem, grid: TimeGrid) -> Array:

@@ -166,7 +166,6 @@ def relative_spread(values: Sequence[float] | Array) -> float:
 
 def _stage_cost(smoothing: float) -> RunningCost:
     def stage_cost(x: Components, u: Components) -> Any:
-        norm = np.sqrt(u[0] ** 2 + u[1] ** 2 + smoothing**2)
-        return quadratic_effort(x, u) + NORM_WEIGHT * norm
+        return quadratic_effort(x, u) + NORM_WEIGHT * np.sqrt(u[0] ** 2 + u[1] ** 2 + smoothing**2)
 
     return stage_cost

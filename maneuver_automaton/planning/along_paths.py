@@ -38,8 +38,7 @@ class AlongPaths(PlanningStep):
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """Load the kernels, and make the table of the simpler vehicle."""
         load_kernels("lattice", "improvement")
-        simpler = kinematic_problem(problem, switch=0.0)
-        cost_to_go_table(simpler, prepared=workspace.prepared)
+        cost_to_go_table(kinematic_problem(problem, switch=0.0), prepared=workspace.prepared)
 
     def offer(self, found: Incumbents) -> None:
         """Offer plans along a first path, then along one that is fast to follow so."""

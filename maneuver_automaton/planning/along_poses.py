@@ -160,8 +160,7 @@ class _Legs:
     def is_timed(self) -> bool:
         """Whether a leg depends on what was driven before it."""
         horizon = self.between.horizon
-        limited = horizon.max_time is not None or horizon.max_trims is not None
-        return self.between.moves or limited
+        return self.between.moves or horizon.max_time is not None or horizon.max_trims is not None
 
     def is_over(self, budget: Budget) -> bool:
         """Whether no leg may be planned any more."""
@@ -279,10 +278,8 @@ class _Search:
         return any(way.is_free for way in self.ways)
 
     def improved(self, budget: Budget) -> list[Way]:
-        """The ways with arrivals that cost less by estimates, in the order that seems best.
-
-        The best chain through each sector of headings at each pose is improved, cheapest first.
-        """
+        """The ways with arrivals that cost less by estimates, in the order that seems best."""
+        # The best chain through each sector of headings at each pose is improved, cheapest first.
         problem = self.found.problem
         order = [k for k, _ in self._cheapest()[1]]
         rows = [np.flatnonzero([k == number for k, _ in self.arrivals]) for number in order]
@@ -329,10 +326,8 @@ class _Search:
         return self.found.problem.order == "given"
 
     def best(self, budget: Budget) -> Chain | None:
-        """The cheapest whole chain of the arrivals, as far as the time lets their legs be planned.
-
-        The cheapest by what is known and estimated is planned; what that takes is known then.
-        """
+        """Cheapest whole chain of the arrivals, as far as the time lets their legs be planned."""
+        # The cheapest by what is known and estimated is planned; what that takes is known then.
         best: Chain | None = None
         while not self.legs.is_over(budget) or best is None:
             least, chosen = self._cheapest()
@@ -431,17 +426,14 @@ class _Search:
     def _offer(self, chain: Chain) -> bool:
         """Offer a whole chain; whether it passes the checks."""
         assert chain.goal_index is not None
-        passed = self.found.may_check and self.found.offer(chain.plan, chain.goal_index)
-        if passed:
+        if self.found.may_check and self.found.offer(chain.plan, chain.goal_index):
             return True
         again = self._from_its_ends(chain)
         return again is not None and self.found.offer(again, chain.goal_index)
 
     def _from_its_ends(self, chain: Chain) -> Plan | None:
-        """The legs planned once more, each from the very end of the one before it.
-
-        What each misses its end by, some 1e-12, would turn what follows.
-        """
+        """The legs planned once more, each from the very end of the one before it."""
+        # What each misses its end by, some 1e-12, would turn what follows.
         goal, plan = self.found.problem.goals[chain.goal_index or 0], chain.plan
         if max(goal.off(plan.end)) <= max(goal.tolerance_m, goal.tolerance_rad, 1e-10):
             return None
@@ -472,10 +464,8 @@ class _Search:
         return found
 
     def guesses(self, best: Chain, budget: Budget) -> Iterator[tuple[Plan, int]]:
-        """Plans to be polished, each with its goal: the best, others where headings are free.
-
-        These pass with the headings that are stated, or each pose in turn with quite another one.
-        """
+        """Plans to be polished, each with its goal: the best, others where headings are free."""
+        # These pass with the headings that are stated, or each pose in turn with quite another one.
         known = self.found.plans[0]
         yield known.plan, known.goal_index
         free = [n for n, k in enumerate(best.passed) if self.ways[k].via.free_heading]
@@ -606,17 +596,13 @@ def _distinct(arrivals: Iterable[Arrival]) -> tuple[Arrival, ...]:
 
 
 def _cheaper(chain: Chain, other: Chain | None) -> Chain:
-    if other is None or chain.cost * (1.0 - GAIN) <= other.cost:
-        return chain
-    return other
+    return chain if other is None or chain.cost * (1.0 - GAIN) <= other.cost else other
 
 
 def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) -> dict[int, Array]:
-    """The least cost (A + 1,) from every arrival to the goal, by what was passed: the last, start.
-
-    Costs (A + 1, A + 1) are those of legs from arrivals, the last row from the start, to arrivals,
-    the last column to the goal; what was passed is written in bits.
-    """
+    """Least cost (A + 1,) from every arrival to the goal, by what was passed: the last, start."""
+    # Costs (A + 1, A + 1) are those of legs from arrivals, the last row from the start, to
+    # arrivals, the last column to the goal; what was passed is written in bits.
     n = len(stays)
     remains = {(1 << n) - 1: costs[:, -1]}
     masks = [(1 << k) - 1 for k in range(n)] if in_order else range((1 << n) - 1)

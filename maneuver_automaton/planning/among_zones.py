@@ -123,8 +123,7 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
     """Plans of a result, the best first, each also quickened outside of the zones."""
     if result.plan is None or result.goal_index is None:
         return
-    found = [result.plan, *(other.plan for other in result.alternatives)]
-    for plan in found:
+    for plan in [result.plan, *(other.plan for other in result.alternatives)]:
         goal_index = result.goal_index if plan is result.plan else nearest_goal(problem, plan)
         yield plan, goal_index
         quick = quickened(problem, plan)
@@ -143,8 +142,7 @@ def _questions(problem: Problem) -> Iterator[Problem]:
         choices.append([True] * may + [False] * (not must))
     through, around = (tuple(one[k] for one in choices) for k in (0, -1))
     mixed = (one for one in product(*choices) if one not in (through, around))
-    firsts = dict.fromkeys((through, around))
-    for chosen in islice(chain(firsts, mixed), MOST_QUESTIONS):
+    for chosen in islice(chain(dict.fromkeys((through, around)), mixed), MOST_QUESTIONS):
         entered = tuple(zone for zone, enter in zip(problem.zones, chosen, strict=True) if enter)
         avoided = tuple(
             Obstacle(zone.shape, name=zone.words)
@@ -222,8 +220,7 @@ def quickened(problem: Problem, plan: Plan) -> Plan | None:
             times.append(duration)
             continue
         n = max(1, math.ceil(float(np.abs(trim.body_velocity).sum()) * duration / STEP))
-        clear = _clear(problem, plan, k, n)
-        for row in clear:
+        for row in _clear(problem, plan, k, n):
             faster, pace = next(
                 (one, pace)
                 for one, pace in choices

@@ -96,10 +96,8 @@ def arrivals_of(
     blocked = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
     if all(blocked):
         proven = len(found) == 1 and not via.radius
-        status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
-        return (), (status, _about(blocked[0]))
-    free = (one for one, why in zip(found, blocked, strict=True) if not why)
-    return tuple(free), None
+        return (), (PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN, _about(blocked[0]))
+    return tuple(one for one, why in zip(found, blocked, strict=True) if not why), None
 
 
 def _about(said: str) -> str:
@@ -275,9 +273,7 @@ def set_bound(problem: Problem, way: Goal | None, goal: Goal) -> float:
 
 def _least(problem: Problem, goal: Goal) -> float:
     """No plan to a goal costs less, whatever its trims: by distance and turn alone."""
-    if problem.has_inertia:
-        return straight_bound(problem, (goal,))
-    return closed_bound(problem, goal)
+    return straight_bound(problem, (goal,)) if problem.has_inertia else closed_bound(problem, goal)
 
 
 def estimates_words(problem: Problem) -> bool:
@@ -303,8 +299,7 @@ class LegCosts:
             self.car = shortest_trims(problem.automaton, problem.cost)
             self.are_least = len(library.twists) <= MOST_LETTERS and three_are_enough(problem)
             few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
-            spin = np.array([[0.0, 0.0, 1.0]])
-            self.twists = np.vstack([library.twists[few][:, :3], spin])
+            self.twists = np.vstack([library.twists[few][:, :3], [[0.0, 0.0, 1.0]]])
             self.rates = library.rates[few]
             letters = range(len(few))
             self.words = np.array(list(itertools.product(letters, repeat=3)), dtype=np.int64)
@@ -327,15 +322,12 @@ class LegCosts:
             return self.car.per_metre * lengths.reshape(len(begins), len(ends))
         times = self._times(self.words, seen)
         rates = self.rates[self.words][:, None, None]
-        sums = np.where(np.isnan(times), np.inf, times * rates).sum(axis=-1)
-        least = sums.min(axis=(0, 2))
+        least = np.where(np.isnan(times), np.inf, times * rates).sum(axis=-1).min(axis=(0, 2))
         return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
 
     def _times(self, words: IntArray, seen: Array) -> Array:
-        """Times (w, k, 2, 3) [s] of words to poses (k, 3) seen from their start; nan: it has none.
-
-        Full turns are left out.
-        """
+        """Times (w, k, 2, 3) [s] of words to poses (k, 3) seen from their start; nan: none."""
+        # Full turns are left out.
         k = len(seen)
         times = steer_batch(
             self.twists,
@@ -416,7 +408,6 @@ class BetterArrivals:
     def _through(self, chain: list[Array], k: int, poses: Array) -> Array:
         """What both legs beside an arrival cost, for poses (m, 3) in its place."""
         before = self._around(chain, k)[0][None]
-        last = k + 1 == len(chain)
-        ends = list(self.problem.goals) if last else [Goal(chain[k + 1])]
+        ends = list(self.problem.goals) if k + 1 == len(chain) else [Goal(chain[k + 1])]
         onward = self.costs.to(poses, ends).min(axis=1)
         return np.asarray(self.costs.between(before, poses)[0] + onward)

@@ -28,8 +28,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     reason, notes = outside(problem.start, problem.bounds), tuple[str, ...]()
     sure = [False] * (1 + len(problem.goals))  # proven free by the kernels, all in one call
     if problem.obstacles and not (problem.parts or problem.start.size > 3 or problem.moves):
-        aside = scene.ends_of(problem)[1].tolist()
-        sure = [one > problem.margin + scene.CLEARLY for one in aside]
+        sure = [one > problem.margin + scene.CLEARLY for one in scene.ends_of(problem)[1].tolist()]
     if reason:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles and not sure[0]:
@@ -117,8 +116,7 @@ def _part_touched(problem: Problem, goal: Goal | None, pose: Array, time: float)
     for name, offset in zip(automaton.model.part_names, offsets, strict=True):
         if name in problem.parts:
             carried = replace(problem, footprint=problem.parts[name], parts={})
-            there = (SE2(pose[:3]) @ SE2(offset)).pose
-            if said := where_touched(carried, there, time):
+            if said := where_touched(carried, (SE2(pose[:3]) @ SE2(offset)).pose, time):
                 return f"the {name}: {said}"
     return ""
 

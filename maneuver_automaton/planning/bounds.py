@@ -61,8 +61,7 @@ def _quickest(problem: Problem, goal: Goal) -> float:
     """Least time [s] to a goal at the model's greatest speeds."""
     way = goal.pose - problem.start
     ways = goal.off(problem.start)[0], math.hypot(*way[:2]), float(np.abs(way[3:]).sum())
-    speeds = _greatest_speeds(problem.automaton)
-    pairs = zip(ways, speeds, strict=True)
+    pairs = zip(ways, _greatest_speeds(problem.automaton), strict=True)
     return max([0.0, *((far - goal.tolerance_m) / speed for far, speed in pairs if speed > 0.0)])
 
 

@@ -110,7 +110,6 @@ def check_plan(
             whole=problem.cost_of(plan) if prices else 0.0,
         )
         arrived = goal if problem.automaton.lattice is None else replace(goal, pose=plan.end)
-        ends = problem.first_trim.reduced_state, problem.last_trim(arrived).reduced_state
         audit = audit_plan(
             plan,
             goal,
@@ -120,7 +119,7 @@ def check_plan(
             obstacles=problem.obstacles,
             body_height=problem.body_height,
             margin=problem.margin,
-            states=ends,
+            states=(problem.first_trim.reduced_state, problem.last_trim(arrived).reduced_state),
             zones=problem.zones,
             places=places,
             via=problem.via,
@@ -312,10 +311,8 @@ def _courses_within_reach(
 def _coasts_within_reach(
     plan: Plan, layer: Layer, problem: Problem
 ) -> tuple[IntArray, Array, Array, Array]:
-    """The parts of trims in which the altitude is within the margin of a layer.
-
-    Numbers of their primitives (m,), starts (m, 3), twists (m, 3) and durations (m,) [s].
-    """
+    """The parts of trims in which the altitude is within the margin of a layer."""
+    # Numbers of their primitives (m,), starts (m, 3), twists (m, 3) and durations (m,) [s].
     trims = [(k, one) for k, one in enumerate(plan.primitives) if isinstance(one, Trim)]
     number = np.array([k for k, _ in trims], dtype=np.int64)
     velocity = np.array([one.body_velocity for _, one in trims]).reshape(-1, plan.start.size)

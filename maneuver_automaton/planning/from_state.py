@@ -123,8 +123,7 @@ class FromState(PlanningStep):
 def _offer_whole(found: Incumbents, one: BetweenTrims, plan: Plan) -> None:
     """Offer a plan between trims, with its first and last maneuver."""
     asked = found.problem
-    off = [sum(goal.off(plan.end)) for goal in one.problem.goals]
-    place = int(np.argmin(off))
+    place = int(np.argmin([sum(goal.off(plan.end)) for goal in one.problem.goals]))
     last = one.last[place]
     whole = plan
     if one.first is not None:
@@ -191,7 +190,8 @@ def _question(
         return None
     pose = problem.start
     if first is not None:
-        pose = _after(pose, first.maneuver.displacement)
+        group = group_of(pose.size)
+        pose = np.array((group(pose) @ group(first.maneuver.displacement)).pose)
     trim = problem.start_trim if first is None else first.trim.name
     asked = base.starting_at(
         pose,
@@ -206,11 +206,6 @@ def _question(
     )
     least += 0.0 if first is None else problem.maneuver_cost(first.maneuver)
     return BetweenTrims(asked, first, last, served, least)
-
-
-def _after(pose: Array, displacement: Array) -> Array:
-    group = group_of(pose.size)
-    return np.array((group(pose) @ group(displacement)).pose)
 
 
 def _ends(
@@ -236,10 +231,9 @@ def _before(goal: Goal, leg: Leg) -> Iterator[Goal]:
     for turn in np.arange(HEADINGS if goal.free_heading else 1) * (2.0 * math.pi / HEADINGS):
         end = goal.pose.copy()
         end[2] += turn
-        pose = (group(end) @ group(leg.maneuver.displacement).inverse()).pose
         yield replace(
             goal,
-            pose=pose,
+            pose=(group(end) @ group(leg.maneuver.displacement).inverse()).pose,
             trim=leg.trim.name,
             state=None,
             free_heading=False,
@@ -291,8 +285,7 @@ def _legs(problem: Problem, state: Trim, *, ends: bool) -> Iterator[Leg]:
     rest = [k for k in order if every[k].is_rest][:1]
     near = [every[k] for k in dict.fromkeys([*order[:NEAREST], *rest])]
     pairs = [(trim, state) if ends else (state, trim) for trim in near]
-    made = all_maneuvers_between(automaton.model, pairs)
-    for trim, maneuvers in zip(near, made, strict=True):
+    for trim, maneuvers in zip(near, all_maneuvers_between(automaton.model, pairs), strict=True):
         for maneuver in maneuvers:
             yield Leg(maneuver, state, trim)
 

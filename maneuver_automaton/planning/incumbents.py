@@ -310,8 +310,7 @@ class Incumbents:
             return plan
 
         def is_free(one: Plan) -> bool:
-            inside = stays_inside(one, self.problem.bounds)
-            return inside and not what_is_hit(
+            return stays_inside(one, self.problem.bounds) and not what_is_hit(
                 self.problem, one, goal, self.workspace, budget=self.budget
             )
 

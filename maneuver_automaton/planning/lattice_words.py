@@ -95,8 +95,7 @@ class LatticeWords(PlanningStep):
             goals, horizon = range(len(problem.goals)), problem.horizon
             library = lattice_library(problem, goals, prepared=workspace.prepared)
             if horizon.time or horizon.max_time or library.per_metre == 0.0:
-                in_time = replace(problem, cost=BY_TIME)
-                lattice_library(in_time, goals, prepared=workspace.prepared)
+                lattice_library(replace(problem, cost=BY_TIME), goals, prepared=workspace.prepared)
             if (freely := _steered_freely(problem)) is not None:
                 lattice_library(freely, goals, prepared=workspace.prepared)
         elif problem.start.size == 3:
@@ -281,8 +280,7 @@ class LatticeWords(PlanningStep):
         if has_paces(self.query):
             # take the trims of a large library that fill the time, once the first word is shortened
             query, left = self.query, self.for_others
-            known = self.words[-1]
-            self.words_of(query, left, known=known, better=self.gained, patience=AT_ONCE)
+            self.words_of(query, left, known=self.words[-1], better=self.gained, patience=AT_ONCE)
             self.query, word = paced(query, self.words[-1])
             if word is not self.words[-1]:
                 self.gained(word)
@@ -350,10 +348,9 @@ class LatticeWords(PlanningStep):
                 self.gained(timed)
 
     def _go_round(self) -> None:
-        """Note a word along the cheapest way of a point, if it costs less than what is known.
-
-        Estimates of the search are too low there to find a way round: it expands the places first.
-        """
+        """Note a word along the cheapest way of a point, if it costs less than what is known."""
+        # Estimates of the search are too low there to find a way round: it expands the places
+        # first.
         query, best = self.query, self.words[-1]
         paid = best.cost - with_price(query.library.priced, best).cost
         for problem in with_cheapest_way_left(query) if paid > PAID * best.cost else ():
@@ -448,8 +445,7 @@ def with_way_blocked(problem: Problem, known: Plan) -> Iterator[Problem]:
 
     Problems whose start or goal the disc touches are left out.
     """
-    times = np.linspace(0.0, known.duration, 101)
-    poses = known.pose_at(times)
+    poses = known.pose_at(np.linspace(0.0, known.duration, 101))
     driven = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
     if not driven[-1] > 0.0:
         return

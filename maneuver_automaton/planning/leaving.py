@@ -152,8 +152,7 @@ def _contact(problem: Problem, touched: dict[int, AnyObstacle]) -> Contact:
 
 
 def _blocked(problem: Problem, why: str) -> PlanResult:
-    said = where_touched(problem, problem.start, problem.start_time)
-    reason = f"at the start {said}; {why}"
+    reason = f"at the start {where_touched(problem, problem.start, problem.start_time)}; {why}"
     return PlanResult(problem=problem, status=PlanStatus.START_BLOCKED, reason=reason)
 
 

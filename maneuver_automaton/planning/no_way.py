@@ -158,9 +158,8 @@ def proven_apart(problem: Problem, budget: Budget, times: int = 1) -> bool:
 
     left = SHARE * budget.left
     load_kernels("separation")  # the compiler's time is not the budget's
-    deadline = budget.clock() + left
     return left > 0.0 and are_apart(
-        problem, most_boxes=min(times * SOON_BOXES, MOST_BOXES), deadline=deadline
+        problem, most_boxes=min(times * SOON_BOXES, MOST_BOXES), deadline=budget.clock() + left
     )
 
 
@@ -199,9 +198,8 @@ class _Following:
         if len(self.path):
             is_whole, expansions, queries = self._go_on(budget)
             word = query.word_of(self.steps, self.goal) if is_whole else None
-        late = word is not None and word.duration > query.most_time
         return FirstPlan(
-            word=None if late else word,
+            word=None if word is not None and word.duration > query.most_time else word,
             expansions=expansions,
             queries=queries,
             exhausted=answer is Reachability.SEPARATED,

@@ -102,10 +102,8 @@ def _lasting(problem: Problem) -> Problem:
 def _search(
     found: Incumbents, graph: Graph, budget: Budget, relaxed: bool
 ) -> tuple[Graph, float, _Why]:
-    """Search a lattice to the end: it in its last window, least cost of a plan, why there is none.
-
-    A `relaxed` graph leaves out conditions that its cheapest path may not meet.
-    """
+    """Search a lattice to the end: its last window, least cost of a plan, why there is none."""
+    # A `relaxed` graph leaves out conditions that its cheapest path may not meet.
     least, wider, why = math.inf, 0, (PlanStatus.UNREACHABLE, _NO_PATH)
     while True:
         exact = _best(found, graph, budget, relaxed)
@@ -137,10 +135,8 @@ def _search(
 
 
 def _in_time(found: Incumbents, graph: Graph, least: float, budget: Budget) -> tuple[float, _Why]:
-    """Search in time, where the cheapest path among all that stands was refused.
-
-    Least cost of a plan, and why there is none, as in `_search`.
-    """
+    """Search in time, where the cheapest path among all that stands was refused."""
+    # Least cost of a plan, and why there is none, as in `_search`.
     problem, prepared = found.problem, found.workspace.prepared
     longest, late = problem.horizon.max_time, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
     soon, proven = FREELY, least
@@ -194,11 +190,9 @@ def _in_time(found: Incumbents, graph: Graph, least: float, budget: Budget) -> t
 
 
 def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> GraphSearch:
-    """A search for the cheapest path that has come to its end, or as far as the budget admits.
-
-    One from the goals runs beside it, which ends soon where few nodes lead to them, and a greedy
-    one if there is no plan for long.
-    """
+    """A search for the cheapest path that has come to its end, or as far as the budget admits."""
+    # One from the goals runs beside it, which ends soon where few nodes lead to them, and a greedy
+    # one if there is no plan for long.
     settings = found.problem.search
     weight = settings.weight or WEIGHT
     if settings.backwards:

@@ -44,7 +44,6 @@ def passed_on_the_way(problem: Problem, plan: Plan) -> tuple[Passed, ...]:
     ...     problem, Plan([0, 0, 0], robot.trims, durations=[3.0]))]
     [(1, 2.0)]
     """
-    times = _times(problem, plan)
     found = [
         Passed(
             number=k,
@@ -52,7 +51,7 @@ def passed_on_the_way(problem: Problem, plan: Plan) -> tuple[Passed, ...]:
             pose=plan.pose_at(plan.start_time + at),
             until=plan.start_time + at + via.stay_s,
         )
-        for k, (via, at) in enumerate(zip(problem.via, times, strict=False), 1)
+        for k, (via, at) in enumerate(zip(problem.via, _times(problem, plan), strict=False), 1)
         if at is not None
     ]
     return tuple(sorted(found, key=lambda one: one.time))

@@ -115,8 +115,7 @@ def polished_price(problem: Problem) -> PolishedPrice:
         # lengths are the same at any pace: a little for the time tells the solver which
         cost = replace(cost, time=HURRY * float(problem.rates.max()))
     if counted:
-        none_is_left = not any(per_second)
-        time = 1.0 if none_is_left else cost.time
+        time = cost.time if any(per_second) else 1.0
         cost = replace(cost, time=time, switch=0.0, direction_change=0.0)
     return PolishedPrice(problem, cost, waiting)
 

@@ -331,14 +331,12 @@ def guess_along(problem: Problem, along: PathGuesses, path: Plan) -> Aimed:
     seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
     goal_index = int(np.argmin([sum(goal.off(path.end)) for goal in problem.goals]))
     first, last = problem.first_trim, problem.last_trim(problem.goals[goal_index])
-    guess = along.guess(seen, first.reduced_state, last.reduced_state)
-    return Aimed(guess, goal_index)
+    return Aimed(along.guess(seen, first.reduced_state, last.reduced_state), goal_index)
 
 
 def guess_of_plan(plan: Plan) -> Guess:
     """States and controls of a plan of any vehicle, seen from its start."""
-    course = replace(plan, start=np.zeros(plan.start.size), start_time=0.0).sample()
-    return course_guess(course)
+    return course_guess(replace(plan, start=np.zeros(plan.start.size), start_time=0.0).sample())
 
 
 def polish_plans(

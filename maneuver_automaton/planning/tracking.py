@@ -147,8 +147,7 @@ def track(
         table=table,
         first=functools.partial(first_plan, aside=aside, is_proven=proven),
     )
-    timed = replace(budget, expansions=None)
-    found = words_of(query, budget=timed, schedule=schedule, known=word)
+    found = words_of(query, budget=replace(budget, expansions=None), schedule=schedule, known=word)
     for _ in found:
         pass
     if found.word is NO_WORD:

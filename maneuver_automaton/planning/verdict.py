@@ -82,8 +82,7 @@ def verify(problem: Problem, plan: Plan, *, leave: bool | None = None) -> Verdic
     cost = problem.cost_of(plan)
     off = plan.start - problem.start
     off[2] = wrapped(off[2])
-    scale = 1.0 + float(np.abs(problem.start).max())
-    if np.abs(off).max() > START_TOLERANCE * scale:
+    if np.abs(off).max() > START_TOLERANCE * (1.0 + float(np.abs(problem.start).max())):
         reason = (
             f"it starts at {plan.start.round(6).tolist()}, the problem at "
             f"{problem.start.round(6).tolist()}"

@@ -90,10 +90,8 @@ class WithinTolerance(PlanningStep):
 
 
 def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
-    """The goals where a plan may end there, then the poses nearest to the start, all others.
-
-    Also whether every pose within the tolerances is proven to collide.
-    """
+    """The goals where a plan may end there, then the poses nearest to the start, all others."""
+    # Also whether every pose within the tolerances is proven to collide.
     lattice, proven = problem.automaton.lattice is not None, False
     if lattice:
         nodes = (nodes_within(problem, goal)[:MOST_NODES] for goal in problem.goals)
@@ -148,10 +146,8 @@ def free_aims(problem: Problem, goal: Goal) -> Iterator[Goal]:
 
 
 def _spread(problem: Problem, goal: Goal) -> Array:
-    """Poses (n, dof) spread evenly over the tolerance of a goal, by additive recurrences.
-
-    Source: Roberts (2018), The unreasonable effectiveness of quasirandom sequences.
-    """
+    """Poses (n, dof) spread evenly over the tolerance of a goal, by additive recurrences."""
+    # Source: Roberts (2018), The unreasonable effectiveness of quasirandom sequences.
     n = SPREAD if goal.pose.size == 3 else FEW
     far, angle, turn = (np.outer(np.arange(1.0, n + 1.0), STEPS) % 1.0).T
     off = goal.tolerance_m * np.sqrt(far) * np.exp(1j * (goal.pose[2] + 2.0 * math.pi * angle))
@@ -188,8 +184,7 @@ def _poses_within(goal: Goal, start: Array) -> Iterator[Array]:
             yield foot
     turns = [0.0]
     if turned and not goal.free_heading:
-        turns = [float(np.clip(turn, -turned, turned)), turned, -turned, 0.0]
-        turns = list(dict.fromkeys(turns))
+        turns = [*dict.fromkeys([float(np.clip(turn, -turned, turned)), turned, -turned, 0.0])]
     shifts = [np.zeros(len(places))]
     if far:
         towards = math.atan2(offset[1], offset[0])

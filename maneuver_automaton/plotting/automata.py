@@ -264,8 +264,7 @@ def _name_length(ax: Axes, automaton: Automaton) -> int:
 def _make_room(ax: Axes, automaton: Automaton, radius: float) -> None:
     """Limits that leave room for the names, as far as the size of the axes tells."""
     wide, high = ax.bbox.width / ax.figure.dpi, ax.bbox.height / ax.figure.dpi
-    longest = max(map(len, automaton.trim_names))
-    name = CHARACTER * min(longest, _name_length(ax, automaton)) + 0.1
+    name = CHARACTER * min(max(map(len, automaton.trim_names)), _name_length(ax, automaton)) + 0.1
     above = name if len(automaton) > MOST_LEVEL_NAMES else 0.2
     reach = (1.0 if len(automaton) > 1 else 0.0) + 1.2 * radius
     unit = max(min(0.5 * wide - name, 0.5 * high - above), 0.2 * min(wide, high)) / reach  # [in]

@@ -192,9 +192,7 @@ class Actor:
 
     def bodies_at(self, time: float) -> list[Array]:
         """Outlines (n, 2) of all its parts at a time [s]; none where it is a point, or gone."""
-        if not self.mover.is_there(time):
-            return []
-        return self.bodies_along(np.array([time]))
+        return self.bodies_along(np.array([time])) if self.mover.is_there(time) else []
 
     def bodies_along(self, times: Array) -> list[Array]:
         """Outlines (n, 2) of all its parts at times (n,) [s], first one shape, then the next."""

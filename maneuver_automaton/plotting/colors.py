@@ -197,8 +197,7 @@ def _speed(twist: Array) -> float:
     drive = float(np.hypot(twist[0], twist[1]))
     if drive > SLIGHT * float(np.abs(twist).max()):
         return drive
-    turn = abs(float(_clear(twist)[2]))
-    return turn or float(np.abs(twist[3:]).sum())
+    return abs(float(_clear(twist)[2])) or float(np.abs(twist[3:]).sum())
 
 
 def _typical(twist: Array) -> Array:

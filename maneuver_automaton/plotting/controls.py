@@ -162,8 +162,7 @@ def _steps(piece: TrackPiece, k: int) -> Array:
     changes = np.flatnonzero(np.diff(piece.control[:-1, k])) + 1
     starts = np.concatenate([[0], changes])
     times = np.stack([piece.time[starts], piece.time[np.append(changes, -1)]], axis=-1)
-    values = np.repeat(piece.control[starts, k], 2)
-    return np.stack([times.ravel(), values], axis=-1)
+    return np.stack([times.ravel(), np.repeat(piece.control[starts, k], 2)], axis=-1)
 
 
 def _set_limits(ax: Axes, times: Array, curves: Sequence[Array]) -> None:

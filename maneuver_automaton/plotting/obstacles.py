@@ -321,8 +321,7 @@ def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
     """A few round times (n,) [s] from `begin` to `end`, which are the first and the last."""
     if not end > begin:
         return np.array([begin])
-    tens = 10.0 ** np.floor(np.log10((end - begin) / most))
-    steps = tens * np.array([1.0, 2.0, 5.0, 10.0])
+    steps = 10.0 ** np.floor(np.log10((end - begin) / most)) * np.array([1.0, 2.0, 5.0, 10.0])
     step = steps[(end - begin) / steps <= most][0]
     inner = step * np.arange(np.floor(begin / step) + 1.0, np.ceil(end / step))
     apart = inner[(inner - begin > 0.3 * step) & (end - inner > 0.3 * step)]
@@ -350,8 +349,7 @@ def obstacle_entries(obstacles: Sequence[AnyObstacle], times: Array) -> Entries:
             for color, name in zip(moment_colors(len(times)), names, strict=True)
         ]
     if any(one.present_s is not None for one in moving):
-        faint = (*MOVING, GONE_ALPHA)
-        gone = Patch(facecolor=faint, edgecolor=(*MOVING, 0.6), linestyle="dashed")
+        gone = Patch(facecolor=(*MOVING, GONE_ALPHA), edgecolor=(*MOVING, 0.6), linestyle="dashed")
         entries.append((gone, "not there at that time"))
     return entries
 

@@ -19,6 +19,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Actor, Cast, rings_with_radius
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
@@ -89,8 +90,6 @@ def _nearest(
     rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers, heights: Array
 ) -> Array:
     """Distance (parts, n) of each part from the nearest part of another vehicle."""
-    import shapely
-
     middles, radii, placed = [], [], []
     for ring, grown, poses in rows:
         middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
@@ -112,8 +111,7 @@ def _nearest(
         return np.asarray(np.hypot(aside, above[one, other, time]))
 
     parts, steps = np.indices(low.shape[1:])
-    likely = low.argmin(axis=1)
-    least = measured(parts, likely, steps)
+    least = measured(parts, low.argmin(axis=1), steps)
     least[np.isinf(low.min(axis=1))] = np.inf
     one, other, time = np.nonzero(low < least[:, None])
     np.minimum.at(least, (one, time), measured(one, other, time))
@@ -213,9 +211,8 @@ def _compared(cast: Cast) -> list[Panel]:
         tidy(ax, x=TIME_LABEL, y=within(ax, [*states, *controls][k]))
 
     more = {one.label: one.unit for one in cast.recording.curves if one.label not in OWN_PANEL}
-    room = max(MOST_STATES - len(more), 1)
     return [
-        *(Panel(partial(draw, k=k)) for k in range(min(count, room))),
+        *(Panel(partial(draw, k=k)) for k in range(min(count, max(MOST_STATES - len(more), 1)))),
         *(Panel(partial(_draw_curves, cast=cast, label=label)) for label in more),
     ]
 

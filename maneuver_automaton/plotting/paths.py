@@ -258,8 +258,7 @@ def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
         by = " and all that it pulls" if len(names_of_parts) > 1 else by
         entries.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
     if swept and cast.obstacles_move:
-        said = "body at the same times"
-        entries.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))
+        entries.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), "body at the same times"))
     if one.held:
         entries.append((line_handle(GREY, width=0.9), "plan of a step"))
     if any(event.kind == "replanned" for event in cast.recording.events):
@@ -403,8 +402,7 @@ def _moment_bodies(one: Actor, cast: Cast) -> PolyCollection:
     outlines = placed(one.body, one.track.at(times))
     for body, track in one.carried:
         outlines += placed(body, track.at(times))
-    bodies = len(outlines) // max(len(times), 1)
-    colors = moment_colors(len(times), color=ROBOT) * bodies
+    colors = moment_colors(len(times), color=ROBOT) * (len(outlines) // max(len(times), 1))
     return PolyCollection(
         outlines, facecolors=[(*color, 0.85) for color in colors],
         edgecolors=[INK], linewidths=1.1, zorder=3.7,

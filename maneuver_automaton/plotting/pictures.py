@@ -296,17 +296,13 @@ def heading_of(recording: Recording, look: Look) -> list[str]:
     lines = [recording.ending] if tells and recording.kind != "plan" else []
     lines += [" · ".join(facts), recording.world.source]
     if recording.kind == "plan":
-        lines.append(_word(first.pieces[0].word, look))
+        width = int((look.width - 2.0 * EDGE) / CHARACTER)
+        lines.append(word_text(first.pieces[0].word, width=width, lines=WORD_LINES))
     broken = [one.text for one in recording.events if one.kind == "broken"]
     lines += [textwrap.shorten(text, TEXT_WIDTH, placeholder=" …") for text in broken[:MOST_BROKEN]]
     if (more := len(broken) - MOST_BROKEN) > 0:
         lines.append(f"and {more} more guarantee{'s' if more > 1 else ''} broken")
     return lines + _reasons(recording)
-
-
-def _word(word: Sequence[str], look: Look) -> str:
-    """The word of a plan in the lines that there are for it."""
-    return word_text(word, width=int((look.width - 2.0 * EDGE) / CHARACTER), lines=WORD_LINES)
 
 
 def _reasons(recording: Recording) -> list[str]:

@@ -133,8 +133,7 @@ def draw_factor(ax: Axes, proof: _Factors) -> QuadMesh:
         rasterized=True,
     )  # fmt: skip
     ax.add_patch(Circle((0.0, 0.0), proof.radius, fill=False, edgecolor=GREY))
-    size = ARROW * proof.radius
-    draw_headings(ax, np.stack([np.zeros(3), proof.worst]), length=size)
+    draw_headings(ax, np.stack([np.zeros(3), proof.worst]), length=ARROW * proof.radius)
     draw_goal(ax, proof.worst, color=INK)
     ax.set_aspect("equal", adjustable="box")
     tidy(ax, x="x [m]", y="y [m]")

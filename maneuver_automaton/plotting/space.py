@@ -209,8 +209,7 @@ def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, f
     """Faces (n, 3) of an upright prism, walls in pieces, each with its shade."""
     ring = _ring(obstacle)
     faces: list[tuple[Array, float]] = []
-    count = max(1, math.ceil((top - bottom) / STORY))
-    levels = np.linspace(bottom, top, count + 1)
+    levels = np.linspace(bottom, top, max(1, math.ceil((top - bottom) / STORY)) + 1)
     for begin, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         along = end - begin
         length = float(np.hypot(*along))
@@ -222,10 +221,8 @@ def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, f
         corners = begin + np.linspace(0.0, 1.0, pieces + 1)[:, None] * along
         for low, high in pairwise(levels):
             for a, b in pairwise(corners):
-                wall = [[*a, low], [*b, low], [*b, high], [*a, high]]
-                faces.append((np.array(wall), shade))
-    roof = np.column_stack([ring, np.full(len(ring), top)])
-    faces.append((roof, 0.42))
+                faces.append((np.array([[*a, low], [*b, low], [*b, high], [*a, high]]), shade))
+    faces.append((np.column_stack([ring, np.full(len(ring), top)]), 0.42))
     return faces
 
 

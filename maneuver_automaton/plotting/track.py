@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Polygon, Shape
 from maneuver_automaton.collision.convex import convex_pieces
@@ -128,8 +129,7 @@ class Track:
         for piece in self.pieces:
             low, high = max(begin, float(piece.time[0])), min(end, float(piece.time[-1]))
             if low < high:
-                inside = piece.time[(piece.time > low) & (piece.time < high)]
-                at = np.array([low, *inside, high])
+                at = np.array([low, *piece.time[(piece.time > low) & (piece.time < high)], high])
                 places = [np.interp(at, piece.time, column) for column in piece.pose.T[:2]]
                 parts.append((piece.name, np.stack(places, axis=-1)))
         return parts
@@ -231,10 +231,9 @@ def _parts(name: str, samples: _Samples) -> list[TrackPiece]:
         twist = _twist(part.time, part.pose)
         if not whole and run.turn == 0:
             twist[2] = 0.0  # what it still turns can hardly be seen
-        said = motion(twist)
         pieces.append(
             TrackPiece(
-                name=name if whole and name != POLISHED else f"{name}, {said}",
+                name=name if whole and name != POLISHED else f"{name}, {motion(twist)}",
                 twist=twist,
                 time=part.time,
                 pose=part.pose,
@@ -261,12 +260,10 @@ def _runs(samples: _Samples) -> list[_Run]:
     heading = samples.pose[:-1, 2]
     ahead = np.cos(heading) * steps[:, 0] + np.sin(heading) * steps[:, 1]
     driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
-    changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
-    cuts = [int(driven[k + 1]) for k in changes]
+    cuts = [int(driven[k + 1]) for k in np.flatnonzero(np.diff(np.sign(ahead[driven])))]
     bounds = [0, *cuts, len(samples.time) - 1]
     runs = [run for first, last in pairwise(bounds) for run in _turns(samples, first, last)]
-    sides = {run.turn for run in runs}
-    return runs if cuts or {-1, 1} <= sides else runs[:1]
+    return runs if cuts or {-1, 1} <= {run.turn for run in runs} else runs[:1]
 
 
 def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
@@ -290,12 +287,9 @@ def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
     while len(runs) > 1 and min(map(weight, runs)) < 1.0:
         k = min(range(len(runs)), key=lambda n: weight(runs[n]))
         beside = [n for n in (k - 1, k + 1) if 0 <= n < len(runs)]
-        into = max(beside, key=lambda n: weight(runs[n]))
-        runs[k] = runs[k]._replace(turn=runs[into].turn)
+        runs[k] = runs[k]._replace(turn=runs[max(beside, key=lambda n: weight(runs[n]))].turn)
         runs = _joined(runs)
-    if len(runs) == 1 and weight(runs[0]) < 1.0:
-        return [runs[0]._replace(turn=0)]
-    return runs
+    return [runs[0]._replace(turn=0)] if len(runs) == 1 and weight(runs[0]) < 1.0 else runs
 
 
 def _joined(runs: Sequence[_Run]) -> list[_Run]:
@@ -309,8 +303,7 @@ def _joined(runs: Sequence[_Run]) -> list[_Run]:
 def _twist(time: Array, pose: Array) -> Array:
     """Mean twist (dof,) of one piece: what it gains from sample to sample, over its duration."""
     gained = (SE2(pose[:-1, :3]).inverse() @ SE2(pose[1:, :3])).log().sum(axis=0)
-    climbed = pose[-1, 3:] - pose[0, 3:]
-    return np.asarray(np.concatenate([gained, climbed]) / (time[-1] - time[0]))
+    return np.asarray(np.concatenate([gained, pose[-1, 3:] - pose[0, 3:]]) / (time[-1] - time[0]))
 
 
 DISC_CORNERS = 48
@@ -333,8 +326,6 @@ def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
 
 def solids_at(outline: Array, poses: Array) -> Any:
     """Shapely geometries (n,) of an outline, or of a point, at `poses` (n, dof) in the plane."""
-    import shapely
-
     corners = SE2(poses[:, None, :3]).act(outline)
     return shapely.points(corners[:, 0]) if len(outline) == 1 else shapely.polygons(corners)
 
@@ -349,13 +340,10 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
     body is taken to fill the hull of its two places: on a circle of radius r that is off by
     ``r * angle**2 / 8``, a millimetre for a car.
     """
-    import shapely
-
     pieces = [corners for outline in outlines for corners, _ in convex_pieces(Polygon(outline))]
     parts: list[Any] = []
     for corners in pieces:
-        at = [track.start[None], *(_samples(piece) for piece in track.pieces)]
-        for poses in at:
+        for poses in [track.start[None], *(_samples(piece) for piece in track.pieces)]:
             places = np.array(placed([corners], poses))
             pairs = np.concatenate([places[:-1], places[1:]], axis=1) if len(places) > 1 else places
             parts += shapely.convex_hull(shapely.multipoints(pairs)).tolist()
@@ -364,8 +352,6 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
 
 def merged(parts: Sequence[Any]) -> list[Any]:
     """Shapely polygons that cover what the `parts` cover, each place once."""
-    import shapely
-
     whole = shapely.union_all(np.array(parts))
     return [part for part in shapely.get_parts(whole).tolist() if part.geom_type == "Polygon"]
 

@@ -154,8 +154,7 @@ def bounded(problem: Problem) -> bool:
 def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | None = None) -> float:
     """Cost of a plan's first `until` seconds, with their switches; `whole`: its own, if known."""
     if problem.place_costs:
-        first = first_part(plan, until)
-        places = sum(one.price for one in problem.place_prices_of(first))
+        places = sum(one.price for one in problem.place_prices_of(first_part(plan, until)))
         return places + cost_until(replace(problem, place_costs=()), plan, until)
     # The cost does not depend on where the rest begins, and to find out where takes longer.
     if any(plan.maneuvers):

@@ -246,8 +246,7 @@ class RecedingHorizon:
             last = self._cut(last, driven)
         at = self.problem.start_time if last is None else last.time + driven
         if passed is None and last is not None and self.problem.via:
-            motion = first_part(last.plan, driven)
-            passed = going_on(self.problem, last.passed, motion, ended=pose)
+            passed = going_on(self.problem, last.passed, first_part(last.plan, driven), ended=pose)
         # Have the problem ahead be the one without what was passed on the way.
         via = still_ahead(self.problem, passed or ())
         if via != self.ahead.via or self.ahead.obstacles is not self.problem.obstacles:
@@ -391,8 +390,7 @@ class RecedingHorizon:
         least, moving = search.lower_bound(), now.as_it_moves
         if self.proven is None or moving is None:
             return least
-        proven = self.proven.prove(moving, chosen.cost, _accumulated(now), now.budget)
-        return max(least, proven)
+        return max(least, self.proven.prove(moving, chosen.cost, _accumulated(now), now.budget))
 
 
 def _accumulated(now: Situation) -> float:

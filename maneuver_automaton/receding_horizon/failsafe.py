@@ -115,8 +115,7 @@ def search_fail_safe(
 
 def _soonest(problem: Problem, plan: Plan) -> Plan:
     """The plan, whose last coast before it rests is as short as is safe."""
-    n = len(plan.trims)
-    if problem.parts or any(plan.maneuvers) or n < 2 or not plan.trims[-1].is_rest:
+    if problem.parts or any(plan.maneuvers) or len(plan.trims) < 2 or not plan.trims[-1].is_rest:
         return plan
     until, least, most = plan.start_time + plan.duration, 0.0, float(plan.durations[-2])
     for _ in range(HALVINGS):
@@ -139,8 +138,7 @@ def _to_rest(problem: Problem) -> Problem:
     first = automaton.index_of(problem.first_trim.name)
     if first not in trims_between(automaton, first, [automaton.rest]):
         return problem
-    rest = automaton.trims[automaton.rest].name
-    goal = replace(problem.goals[0], trim=rest, free_heading=False)
+    goal = replace(problem.goals[0], trim=automaton.trims[automaton.rest].name, free_heading=False)
     return replace(problem, goals=(goal,))
 
 
@@ -219,8 +217,7 @@ def _plan(
             held = automaton.trims[library.trims[search.links[row, kernels.TRIM]]]
             _coast(word, times, between, held, float(search.nodes[row, kernels.LASTING]))
     trim = int(search.links[last, kernels.TRIM])
-    rest = int(task.rest_of[library.arrays.library.class_of[trim]])
-    goes_on = rest if task.rests else trim
+    goes_on = int(task.rest_of[library.arrays.library.class_of[trim]]) if task.rests else trim
     left = float(search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK])
     if goes_on >= 0 and (task.rests or left > 0.0):
         _coast(word, times, between, automaton.trims[library.trims[goes_on]], left)

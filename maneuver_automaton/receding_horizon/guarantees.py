@@ -95,14 +95,11 @@ def promises(problem: Problem, *, step: float) -> Promises:
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None
-    effort = 0.0
-    if fixed and cost:
-        effort = _least_effort(problem, cost)
     return Promises(
         least_rate=max(least, 0.0),
         rest_rate=rest,
         time_rate=cost.time if cost and not fixed else 0.0,
-        effort=effort,
+        effort=_least_effort(problem, cost) if fixed and cost else 0.0,
         horizon=problem.horizon.time,
         step=step,
         switch=cost.switch if cost and fixed else 0.0,
@@ -231,8 +228,7 @@ class LoopBounds:
         pose = here.start[:3]
         driven = accumulated - self.since
         beside = 0.0 if self.whole is None else self.whole.anywhere(pose)
-        on_the_way = 0.0 if self.finest is None else self.finest.after(pose, driven)
-        best = max(beside, on_the_way)
+        best = max(beside, 0.0 if self.finest is None else self.finest.after(pose, driven))
         proven = in_costs(here, best) if best > 0.0 else 0.0
         return max(proven, self.least - (accumulated - self.at))
 
@@ -241,8 +237,7 @@ class LoopBounds:
         known = self.known(here, accumulated)
         if value == math.inf or value - known <= self.gap * value or budget.is_over:
             return known
-        watch = Watch(gap=self.gap, cost=value, bound=known)
-        proving = Proving(here, budget, watch)
+        proving = Proving(here, budget, Watch(gap=self.gap, cost=value, bound=known))
         proving.run()
         for function in proving.functions:
             if function.whole:

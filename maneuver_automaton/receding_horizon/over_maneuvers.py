@@ -68,8 +68,7 @@ class OverManeuvers(StepSearch):
         """The obstacle that a plan hits, or that comes to its rest; empty if there is none."""
         last = self._last_trim(plan)
         if self.here.moves and last.is_rest:
-            arrival = plan.start_time + plan.duration
-            plan = rested(plan, last, max(self.stand, until - arrival))
+            plan = rested(plan, last, max(self.stand, until - (plan.start_time + plan.duration)))
         return what_is_hit(self.here, plan, self.here.goals[0])
 
     def _last_trim(self, plan: Plan) -> Trim:
@@ -96,9 +95,7 @@ class OverManeuvers(StepSearch):
     def continued(self, plan: Plan, after: float) -> Plan | None:
         """The first seconds of a plan, then a fail-safe trajectory, if FCL finds nothing either."""
         whole = super().continued(plan, after)
-        if whole is None or not allowed(self.here, whole) or self._hit(whole):
-            return None
-        return whole
+        return None if whole is None or not allowed(self.here, whole) or self._hit(whole) else whole
 
     def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The cheapest safe word for each goal, if it costs less than the kept plan.
@@ -282,8 +279,7 @@ class OverManeuvers(StepSearch):
 
     def mitigation(self) -> Mitigation:
         """Of braking and driving on, the motion that is hit later."""
-        still = self._standing(self.settings.step)
-        found = [self._contact(plan) for plan in self.tried or [still]]
+        found = [self._contact(plan) for plan in self.tried or [self._standing(self.settings.step)]]
         return max(found, key=lambda one: one.contact)
 
     def _contact(self, plan: Plan) -> Mitigation:

@@ -140,8 +140,7 @@ def _orders(trims: tuple[Trim, ...]) -> tuple[list[list[float]], list[int], bool
     twists = [trim.body_velocity.tolist() for trim in trims]
     moving = [k for k, twist in enumerate(twists) if any(twist)]
     rests_last = moving == list(range(len(moving)))
-    fixed = rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
-    return twists, moving, fixed
+    return twists, moving, rests_last and not any(map(commute, twists, twists[1 : len(moving)]))
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
@@ -151,8 +150,7 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
     )
     if not bracket:
         return True
-    scale = max(map(abs, one)) * max(map(abs, other))
-    return bool(bracket <= 1e-12 * scale)
+    return bool(bracket <= 1e-12 * (max(map(abs, one)) * max(map(abs, other))))
 
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
@@ -188,8 +186,7 @@ def reanchored(
         pose = np.array(goal.pose)
         pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
         pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
-        eased = replace(goal, pose=pose)
-        near = same_word(problem, plan, eased, pad=pad, under_way=under_way)
+        near = same_word(problem, plan, replace(goal, pose=pose), pad=pad, under_way=under_way)
         if near is not None:
             yield near
 

@@ -453,10 +453,8 @@ def _audited(problem: Problem, piece: Plan, scale: tuple[float, ...] | None = No
 
 
 def _judged(problem: Problem, now: Step, driven: Audit) -> Step:
-    """The step with the clearance of the driven motion; a collision is flagged.
-
-    It is a disturbance's where the motion that was decided on is free.
-    """
+    """The step with the clearance of the driven motion; a collision is flagged."""
+    # It is a disturbance's where the motion that was decided on is free.
     now = replace(now, clearance_m=driven.min_clearance_m)
     if _is_clear(driven):
         return now

@@ -97,10 +97,9 @@ class Situation:
                 self._go_on_from(state, last)
 
     def _go_on_from(self, state: Array, last: Step) -> None:
-        """Put a maneuver from the measured state in place of what was committed, if they differ.
-
-        Where the plan is over, one leads to the trim in which it ended, unless the vehicle stands.
-        """
+        """Put a maneuver from the measured state in place of what was committed, if they differ."""
+        # Where the plan is over, one leads to the trim in which it ended, unless the vehicle
+        # stands.
         assert self.rest is not None
         here, model = self.here, self.here.automaton.model
         if self.rest.trims:
@@ -110,8 +109,7 @@ class Situation:
             measured = trim_at(model, state, "measured state")
             if measured.is_rest and not model.reduced_dynamics(state, measured.control).any():
                 return
-            trims = last.plan.trims or (here.last_trim(here.goals[last.goal_index]),)
-            trim = trims[-1]
+            trim = (last.plan.trims or (here.last_trim(here.goals[last.goal_index]),))[-1]
             expected = trim.reduced_state
             after = Plan(here.start, (trim,), durations=[0.0], start_time=here.start_time)
         off = float(np.abs(expected - state).max())
@@ -231,9 +229,7 @@ class Situation:
     def padded(self, plan: Plan) -> Plan:
         """The plan, then rest for the remainder of a fixed time."""
         total, pad = self.here.horizon.time, self.settings.pad
-        if total is None or pad is None:
-            return plan
-        return rested(plan, pad, total - plan.duration)
+        return plan if total is None or pad is None else rested(plan, pad, total - plan.duration)
 
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""

@@ -151,8 +151,7 @@ def simulate_many(
         raise ValueError(f"jobs must be at least 1, got {jobs}")
     at_once = jobs == 1 and scheduler is None and progress is None
     n_chunks = min(1 if at_once else CHUNKS * max(jobs, 4), len(cases))
-    parts = np.array_split(np.arange(len(cases)), n_chunks)
-    chunks = [[cases[k] for k in part] for part in parts]
+    chunks = [[cases[k] for k in part] for part in np.array_split(np.arange(len(cases)), n_chunks)]
     closed = partial(
         simulate,
         step=step,
@@ -168,8 +167,7 @@ def simulate_many(
     upset = Disturbance() if disturbance is None else disturbance
     done: list[Outcome] = []
     work = partial(_outcomes, problem, upset=upset, closed=closed)
-    results = in_parallel(work, chunks, jobs=jobs, scheduler=scheduler, ends_early=True)
-    for outcomes in results:
+    for outcomes in in_parallel(work, chunks, jobs=jobs, scheduler=scheduler, ends_early=True):
         done += outcomes
         if progress is not None:
             progress(len(done), len(cases))

@@ -283,8 +283,7 @@ class StepSearch:
         """Beginnings of paths to the goal, each with a fail-safe trajectory after it."""
         for plan in self.ambitions():
             # what stands still leaves no reason to go on in steps
-            moving = self.here.moves
-            reach = self.settings.step if moving else NEARLY * free_until(self.here, plan)
+            reach = self.settings.step if self.here.moves else NEARLY * free_until(self.here, plan)
             for share in SHARES:
                 towards = self.continued(plan, share * reach)
                 if towards is not None:

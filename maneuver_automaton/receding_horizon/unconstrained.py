@@ -414,8 +414,7 @@ def shifted(problem: UnconstrainedProblem, plan: HorizonPlan) -> IntArray:
     """The rest of a sequence after its applied intervals, filled up with the cheapest trim (n,)."""
     applied = problem.horizon.applied
     cheapest = np.argmin(problem.cost.control_rates(problem.automaton.controls))  # rest, if any
-    fill = np.full(applied, cheapest, dtype=np.int64)
-    return np.concatenate([plan.trims[applied:], fill])
+    return np.concatenate([plan.trims[applied:], np.full(applied, cheapest, dtype=np.int64)])
 
 
 def _stands_still(plan: HorizonPlan, twists: Array) -> bool:

@@ -325,8 +325,7 @@ def _wider(
             break
         cost = best.cost
         if width:
-            horizon = planner.last_tick * planner.tick
-            found = _searched(planner.wider(width, horizon_s=horizon))
+            found = _searched(planner.wider(width, horizon_s=planner.last_tick * planner.tick))
         elif cost is None and loop:
             found, driven = _driven(planner, give_up)
         else:

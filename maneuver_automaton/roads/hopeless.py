@@ -15,6 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import RECENT
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Shape
 from maneuver_automaton.collision.outline import united
@@ -44,8 +45,6 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
 
     `there` is the start, a plan of no duration.
     """
-    import shapely
-
     causes = [(one, f"{said} at the start") for one, said in judged(scene, vehicle, there).faults]
     speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
     if (beyond := max(low - speed, speed - high)) > EXACT:
@@ -64,14 +63,11 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
 
 def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]:
     """Distances [m] of the body at the start: to the edge of the road, to the nearest road user."""
-    import shapely
-
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     body, now = _bodies(scene.start.middle[None], size), scene.start.time
-    present = [(one, *presence_of(one)) for one in scene.traffic]
     there = [
         one.shape if one.motion is None else one.at(now)
-        for one, begin, end in present
+        for one, begin, end in [(one, *presence_of(one)) for one in scene.traffic]
         if begin <= now <= end
     ]
     edge = shapely.boundary(RECENT.once(drivable_area, scene.lanelets))
@@ -80,12 +76,8 @@ def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]
 
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
-    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
-
-    The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
-    """
-    import shapely
-
+    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen."""
+    # The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
     model, start = vehicle.model, scene.start
     lasts = goal.time[1] - start.time
     if lasts < -EXACT:
@@ -113,13 +105,10 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
 
 
 def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, most: float) -> str:
-    """Why who drives `most` forwards [m] never gets back to a goal; empty if that cannot be seen.
-
-    Before its heading is across that of the start, its rear axle has moved aside by its least
-    radius, and ahead of that is its front. Without it, the rear axle is never behind where it was.
-    """
-    import shapely
-
+    """Why who drives `most` forwards [m] never gets back to a goal; empty if that is not seen."""
+    # Before its heading is across that of the start, its rear axle has moved aside by its least
+    # radius, and ahead of that is its front. Without it, the rear axle is never behind where it
+    # was.
     back = max(vehicle.ahead, 0.0)
     corners = np.array([[-back, -FAR], [FAR, -FAR], [FAR, FAR], [-back, FAR]])
     away = goal.away_from(shapely.Polygon(SE2(middle).act(corners)))
@@ -139,13 +128,9 @@ def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, mo
 def _may_fit(
     places: Sequence[Shape], headings: tuple[float, float], road: Any, vehicle: RoadVehicle
 ) -> bool:
-    """Whether the body may be on the road with its middle in a place, at one of the headings.
-
-    Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
-    box have in common of the body is not on the road, in each of them.
-    """
-    import shapely
-
+    """Whether the body may be on the road with its middle in a place, at one of the headings."""
+    # Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
+    # box have in common of the body is not on the road, in each of them.
     shapely.prepare(road)
     size = 0.5 * np.array([vehicle.length, vehicle.width])
     corners = np.concatenate(outlines_of(places))
@@ -172,8 +157,6 @@ def _may_fit(
 
 def _away(places: Sequence[Shape] | None, points: Any) -> Array:
     """Distances of shapely geometries (n,) to the nearest of some places; zeros for any place."""
-    import shapely
-
     apart = [
         shapely.distance(geometry_of(one), points) - (one.radius if isinstance(one, Disc) else 0.0)
         for one in places or ()
@@ -183,16 +166,12 @@ def _away(places: Sequence[Shape] | None, points: Any) -> Array:
 
 def _bodies(middles: Array, size: Array) -> Any:
     """Rectangles at poses (n, 3); half their length and width (2,)."""
-    import shapely
-
     corners = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     return shapely.polygons(np.asarray(SE2(middles[:, None]).act(corners)))
 
 
 def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
     """Who keeps the middle of a vehicle from each goal, in words; empty where nobody does."""
-    import shapely
-
     walls: dict[str, list[Wall]] = {}
     for one in scene.traffic:
         if one.motion is None or not np.ptp(one.motion.pose, axis=0).any():
@@ -228,13 +207,9 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
 def _met(
     scene: RoadScene, vehicle: RoadVehicle, road: Any, walls: Mapping[str, Sequence[Wall]]
 ) -> list[bool]:
-    """Whether the middle of a vehicle can get to each goal, past walls that are there for a time.
-
-    From one time at which a wall comes or goes to the next, it stays in a connected part of what
-    they leave of the road, and gets no further than the top speed allows.
-    """
-    import shapely
-
+    """Whether the middle of a vehicle can get to each goal, past walls that stand for a time."""
+    # From one time at which a wall comes or goes to the next, it stays in a connected part of what
+    # they leave of the road, and gets no further than the top speed allows.
     begin, last = scene.start.time, scene.last_time
     every = [one for some in walls.values() for one in some]
     times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import LieGroup
@@ -183,8 +184,6 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
     >>> round(drivable_area(gap).area, 9)
     18.0
     """
-    import shapely
-
     known = {lanelet.number: lanelet for lanelet in lanelets}
     rings, inner = [lanelet.ring for lanelet in lanelets], set[tuple[int, int]]()
     for lanelet in lanelets:
@@ -201,8 +200,7 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
             apart = np.hypot(*(ring[:2] - ring[:1:-1]).T)
             if apart.max() > ROUNDED and (apart <= np.where(amid, SEAM, ROUNDED)).all():
                 rings.append(ring)
-    parts = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-    area = _flat(_flat(parts))
+    area = _flat(_flat([shapely.make_valid(shapely.Polygon(ring)) for ring in rings]))
     grown = shapely.buffer(area, ROUNDED, join_style="mitre")
     return _flat(united([area, shapely.buffer(grown, -ROUNDED, join_style="mitre")]))
 
@@ -218,16 +216,12 @@ def _between(one: Lanelet, other: Lanelet) -> tuple[int, Array]:
 
 def _flat(geometries: Any) -> Any:
     """The union of the polygons among geometries and their parts."""
-    import shapely
-
     parts = shapely.get_parts(shapely.get_parts(geometries))
     return united(parts[shapely.get_dimensions(parts) == 2].tolist())
 
 
 def obstacles_in(land: Any) -> tuple[Obstacle, ...]:
     """A shapely area as static obstacles, cut into tiles."""
-    import shapely
-
     if land.is_empty:
         return ()
     low_x, low_y, high_x, high_y = land.bounds

@@ -222,10 +222,9 @@ class RoadPlanner:
 
         Its samples are at most `max_step` [m, rad] apart.
         """
-        placed = np.concatenate([self.world(state[:3]), state[3:]])
         return plan_of_controls(
             self.vehicle.model,
-            placed,
+            np.concatenate([self.world(state[:3]), state[3:]]),
             controls,
             tick=self.tick,
             start_time=self.time_of(tick),
@@ -362,9 +361,8 @@ class RoadPlanner:
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
     ) -> RoadDecision:
         """The plan from a state (5,) under controls (n, 2), those of its stop included."""
-        model = self.vehicle.model
         states = _kernels_motion.driven(
-            model.wheelbase, self.tick, np.array(state), np.array(controls)
+            self.vehicle.model.wheelbase, self.tick, np.array(state), np.array(controls)
         )
         return RoadDecision(
             tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches

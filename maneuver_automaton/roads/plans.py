@@ -224,9 +224,8 @@ def polished_controls(
             row = number % len(PATTERNS)
             size = number // len(PATTERNS) % len(SIZES)
             one = Moves(moves.pattern[[row]], moves.blocks[[row]], moves.size[[size]])
-            begin = every * number
             made += _kernels_polish.polish(
-                horizon, one, state, controls, plan.lasting, plan.tick, begin, 1
+                horizon, one, state, controls, plan.lasting, plan.tick, every * number, 1
             )
         moved += made
         if not made:

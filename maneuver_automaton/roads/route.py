@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.roads.lanelets import ROUNDED, Lanelet, along, drivable_area
 from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -108,14 +109,11 @@ def hindrance(route: Route, scene: RoadScene, vehicle: RoadVehicle) -> str:
 
 def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | None:
     """How far the road goes on to the left and to the right of a point of a route [m]."""
-    import shapely
-
     point, aside = route.points[k], np.array([-np.sin(route.heading[k]), np.cos(route.heading[k])])
     reach = ASIDE * COLUMNS * aside
     line = shapely.LineString([point - reach, point + reach])
     near = [one for one in scene.lanelets if shapely.LinearRing(one.ring).distance(line) <= 0.0]
-    parts = shapely.get_parts(shapely.intersection(line, drivable_area(near))) if near else ()
-    for part in parts:
+    for part in shapely.get_parts(shapely.intersection(line, drivable_area(near))) if near else ():
         if shapely.distance(part, shapely.Point(point)) <= ROUNDED:
             offsets = (shapely.get_coordinates(part) - point) @ aside
             return float(offsets.max()), float(-offsets.min())
@@ -124,8 +122,6 @@ def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | Non
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
     """Numbers of the lanelets around a pose (3,) with its direction; else of the nearest."""
-    import shapely
-
     place = shapely.Point(middle[:2])
     forward = np.array([np.cos(middle[2]), np.sin(middle[2])])
     off = {}
@@ -142,8 +138,6 @@ def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
 
 def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]:
     """Numbers of the lanelets that a goal covers, or that cover it, by a good part."""
-    import shapely
-
     if goal.lanelets:
         return list(goal.lanelets)
     found = []
@@ -151,8 +145,7 @@ def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]
         region = shapely.make_valid(shapely.Polygon(place))
         for lanelet in lanelets:
             piece = shapely.make_valid(shapely.Polygon(lanelet.ring))
-            common = shapely.intersection(piece, region).area
-            if common > SHARE * min(piece.area, region.area):
+            if shapely.intersection(piece, region).area > SHARE * min(piece.area, region.area):
                 found.append(lanelet.number)
     return found
 
@@ -190,8 +183,7 @@ def _straight_on(lanelets: dict[int, Lanelet], number: int, *, known: set[int]) 
     more: list[int] = []
     left = BEYOND
     while left > 0.0:
-        steps = np.diff(lanelets[number].center, axis=0)
-        ahead = np.arctan2(*steps[-1][::-1])
+        ahead = np.arctan2(*np.diff(lanelets[number].center, axis=0)[-1][::-1])
         after = [k for k in lanelets[number].successors if k in lanelets and k not in known]
         if not after:
             break
@@ -241,14 +233,11 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     points = np.stack([np.interp(at, station, longer[:, k]) for k in range(2)], axis=-1)
     steps = np.gradient(points, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    limit = limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
-    return points, heading, limit
+    return points, heading, limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
 
 
 def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array) -> Array:
     """`Route.limit`: of lanelets that overlap the greatest holds."""
-    import shapely
-
     offsets = ASIDE * np.arange(-COLUMNS, COLUMNS + 1)
     limit = np.full((len(points), len(offsets)), -np.inf)
     if all(one.speed_limit is None for one in lanelets):
@@ -285,8 +274,6 @@ def extent_on(rings: Sequence[Array], route: Route) -> Array:
 
 
 def _extent(rings: Sequence[Array], points: Array, heading: Array) -> Array:
-    import shapely
-
     if (around := sum(shapely.LinearRing(ring).length for ring in rings)) > LONGEST:
         raise ValueError(f"goal: its outline is {around:.3g} m long, need at most {LONGEST:g} m")
     corners = np.concatenate(

@@ -18,6 +18,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import RECENT
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
@@ -55,8 +56,6 @@ class Barrier:
 
     def from_body(self, vehicle: RoadVehicle, rear: Array) -> tuple[float, bool]:
         """Distance to a vehicle's body [m], and whether the barrier is ahead of it."""
-        import shapely
-
         corners, body = self.strip.corners, vehicle.footprint.moved(SE2(rear)).corners
         forward = np.array([math.cos(rear[2]), math.sin(rear[2])])
         ahead = float((corners.mean(axis=0) - body.mean(axis=0)) @ forward) > 0.0
@@ -109,8 +108,6 @@ def _side_by_side(lanelets: dict[int, Lanelet], numbers: Sequence[int]) -> set[i
 
 def _across(stop_line: StopLine, lanelets: dict[int, Lanelet], ours: set[int]) -> Polygon:
     """A thin strip before a line, across its lane and those against it, no other of `ours`."""
-    import shapely
-
     own = lanelets[stop_line.lanelet]
     against = _side_by_side(lanelets, own.against) - ours
     area = shapely.buffer(
@@ -157,8 +154,6 @@ def _too_fast(
     lanelets: Sequence[Lanelet], middle: Array, speed: Array, times: Array
 ) -> Iterator[str]:
     """Where a limit is exceeded most, if one is; of lanelets that overlap the greatest holds."""
-    import shapely
-
     places = shapely.points(middle[:, :2])
     allowed = np.full(len(times), -math.inf)
     for one in lanelets:
@@ -248,8 +243,6 @@ def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]
     >>> min(abs(float(y)) for one in pieces for y in one.shape.corners[:, 1])
     2.0
     """
-    import shapely
-
     places = plan.sample().pose[:, :2]
     path = shapely.LineString(places) if len(places) > 1 else shapely.Point(places[0])
     near = shapely.buffer(path, BESIDE)

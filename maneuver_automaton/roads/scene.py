@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import AnyShape, Box, Disc, Obstacle, Polygon, Shape, as_shapes
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, rounded
@@ -211,8 +212,6 @@ class GoalRegion:
 
     def contains(self, middle: ArrayLike, *, speed: float, time: float) -> bool:
         """Whether a pose (3,) of the middle, a speed [m/s] and a time [s] are within it."""
-        import shapely
-
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
         slowest, fastest = self.speed or (-math.inf, math.inf)
         if not (
@@ -235,8 +234,6 @@ class GoalRegion:
         >>> goal.off_by([5.0, 0.5, 0.1], speed=4.0)
         (3.0, 0.0, -1.0)
         """
-        import shapely
-
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
         away = self.away_from(shapely.Point(x, y))
         turned = 0.0
@@ -254,8 +251,6 @@ class GoalRegion:
         >>> GoalRegion(places=(Disc(1.0, [5.0, 0.0]),)).away_from(shapely.Point(2.0, 0.0))
         2.0
         """
-        import shapely
-
         apart = (
             float(shapely.distance(geometry_of(one), area))
             - (one.radius if isinstance(one, Disc) else 0.0)
@@ -287,8 +282,6 @@ def outlines_of(places: Sequence[Shape]) -> list[Array]:
 
 def geometry_of(place: Shape) -> Any:
     """A shape as a shapely geometry; a disc as its center, to be grown by its radius."""
-    import shapely
-
     if isinstance(place, Disc):
         return shapely.Point(place.center)
     return shapely.Polygon(place.corners, place.holes if isinstance(place, Polygon) else ())

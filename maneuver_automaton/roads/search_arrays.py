@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import RECENT
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Disc, Obstacle, Shape
 from maneuver_automaton.collision.outline import outlines, united
 from maneuver_automaton.collision.world import world_of
@@ -116,8 +117,6 @@ def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
 
 def _within(ring: Array) -> Array:
     """The corners (n, 2) of what is inside a ring, off its edge; the ring if that is no polygon."""
-    import shapely
-
     inner = shapely.buffer(shapely.Polygon(ring), -INSIDE, join_style="mitre")
     same = inner.geom_type == "Polygon" and len(inner.exterior.coords) == len(ring) + 1
     return np.asarray(inner.exterior.coords)[:-1] if same else ring
@@ -125,8 +124,6 @@ def _within(ring: Array) -> Array:
 
 def static_obstacles(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> StaticObstacles:
     """Static obstacles on the route, grown by the vehicle's half length and half width."""
-    import shapely
-
     area = RECENT.once(drivable_area, scene.lanelets)
     grown = 0.5 * np.array([-vehicle.length, vehicle.length, -vehicle.width, vehicle.width])
     extents, passable = [], []
@@ -245,21 +242,15 @@ def clearing_of(
 
 def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
     """A strip of land along the edge of the road as obstacles, to `far` [m] from the start."""
-    import shapely
-
     x, y = scene.start.middle[:2].tolist()
     around = shapely.box(x - far, y - far, x + far, y + far)
     near = tuple(lanelet for lanelet in scene.lanelets if _meets(lanelet, around))
-    area = RECENT.once(drivable_area, near)
-    road = shapely.simplify(shapely.intersection(area, around), SIMPLER)
-    strip = shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road)
-    return obstacles_in(strip)
+    road = shapely.simplify(shapely.intersection(RECENT.once(drivable_area, near), around), SIMPLER)
+    return obstacles_in(shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road))
 
 
 def _grown(shape: Shape, by: float) -> tuple[Obstacle, ...]:
     """Static obstacles that hold all within a distance [m] of a shape."""
-    import shapely
-
     if isinstance(shape, Disc):
         return (Obstacle(Disc(shape.radius + by, shape.center)),)
     outline = united(outlines(shape))

@@ -158,8 +158,7 @@ def _in_order(
 
 def _seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
     """What a vehicle is going to do as a road user for others, a little larger than it is."""
-    size = [vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM]
-    body = Box(size, [vehicle.ahead, 0.0])
+    body = Box([vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM], [vehicle.ahead, 0.0])
     return Obstacle(body, motion=Motion(times, poses), name=name)
 
 
@@ -349,8 +348,7 @@ def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -
     while not (all(one.is_done for one in drivers.values()) or stopped()):
         time = now + number * step
         for name, driver in drivers.items():
-            waits = driver.planner.time_of(driver.tick) > time + TIME_TOLERANCE
-            if driver.is_done or waits:
+            if driver.is_done or (driver.planner.time_of(driver.tick) > time + TIME_TOLERANCE):
                 continue
             others = [
                 held

@@ -129,8 +129,7 @@ def _check_names(document: Document, trims: tuple[NamedTrim, ...]) -> None:
 
 def _need(model: Model) -> str:
     names = f"control: [{', '.join(model.control_names)}]"
-    state = f"state: [{', '.join(model.reduced_names)}] or " if model.reduced_names else ""
-    return state + names
+    return (f"state: [{', '.join(model.reduced_names)}] or " if model.reduced_names else "") + names
 
 
 def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
@@ -309,8 +308,7 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
     """
     if name not in PRESETS:
-        known = (*PRESETS, *stock_libraries())
-        raise ValueError(f"got {name!r}, need one of {', '.join(known)}")
+        raise ValueError(f"got {name!r}, need one of {', '.join((*PRESETS, *stock_libraries()))}")
     preset = PRESETS[name]
     if not isinstance(model, preset.models):
         raise ValueError(f"got {name!r}, which is for {preset.what}, not the {model.name}")

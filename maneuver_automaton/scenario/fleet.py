@@ -330,8 +330,7 @@ def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPar
     def part(key: str, kind: type[Kind]) -> Kind | None:
         if key not in whole:
             return None
-        inside = replace(document, value=whole[key], homes={(): (key,)})
-        return checked(inside, kind)
+        return checked(replace(document, value=whole[key], homes={(): (key,)}), kind)
 
     rest = {key: value for key, value in whole.items() if key not in ("fleet", LOOP)}
     settings = part("fleet", FleetPart) or FleetPart()

@@ -158,8 +158,7 @@ def _road_vehicle(beside: Path) -> roads.RoadVehicle:
             f"--with: {beside}: vehicle: footprint: need one rectangle along the axis of the car"
         )
     length, width = body.size.tolist()
-    ahead = float(body.center[0])
-    return roads.RoadVehicle(model=model, length=length, width=width, ahead=ahead)
+    return roads.RoadVehicle(model=model, length=length, width=width, ahead=float(body.center[0]))
 
 
 def statements_of(path: Path) -> tuple[Statement, ...] | None:
@@ -222,8 +221,7 @@ def remarks_on(path: Path | str) -> list[str]:
 
 def _headings(value: Any, where: Where) -> Iterator[tuple[Where, float]]:
     """Headings that a part of a file states, and where."""
-    below = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, inner in below:
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
         at = (*where, key)
         if key == "pose" and isinstance(inner, list) and len(inner) > 2:
             inner, at = inner[2], (*at, 2)

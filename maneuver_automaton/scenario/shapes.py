@@ -119,11 +119,9 @@ def zones_of(
 def _zones_of_mask(
     document: Document, part: ZonePart, k: int, path: Path, fastest: float
 ) -> Iterator[Zone]:
-    """A zone for each region of one value of a speed mask, read as Nav2's speed filter does.
-
-    Source: nav2_costmap_2d, `SpeedFilter`: 0 is no limit, nor is a speed that is not above 0, or of
-    more than 100 %.
-    """
+    """A zone for each region of one value of a speed mask, read as Nav2's speed filter does."""
+    # Source: nav2_costmap_2d, `SpeedFilter`: 0 is no limit, nor is a speed that is not above 0, or
+    # of more than 100 %.
     limit = part.speed_limit
     if limit is None:
         raise document.error(("zones", k), "map: needs speed_limit: {base, multiplier, unit}")
@@ -199,8 +197,7 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
     elif isinstance(shape, Box):
         plain = str(shape.heading) == "0.0"  # -0.0 is not
         heading = {} if plain else {"heading_rad": float(shape.heading)}
-        box = {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}
-        entry["box_m"] = box
+        entry["box_m"] = {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}
     else:
         entry |= {"polygon_m": shape.corners.tolist(), **holes_entry(shape)}
     if obstacle.height is not None:

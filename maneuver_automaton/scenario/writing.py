@@ -275,8 +275,7 @@ def _cost(cost: StageCost) -> dict[str, Any]:
             "cost: a scenario file can state the terms of the class Cost only, need its method "
             "terms(), which returns them"
         )
-    order = {1.0: 1, 2.0: 2}.get(terms.norm_order, "inf")
-    return stated(CostPart, terms, norm_order=order)
+    return stated(CostPart, terms, norm_order={1.0: 1, 2.0: 2}.get(terms.norm_order, "inf"))
 
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:

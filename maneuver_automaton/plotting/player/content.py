@@ -17,7 +17,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
-from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Actor, Cast, cast_of
+from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Cast, cast_of
 from maneuver_automaton.plotting.colors import Color, track_colors
 from maneuver_automaton.plotting.over_time import distance_times, nearest_others
 from maneuver_automaton.plotting.player.numbers import (
@@ -200,7 +200,9 @@ def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], l
     kinds = [id(one.model if one.problem is None else one.problem.automaton) for one in movers]
     for kind in dict.fromkeys(kinds):
         alike = [one for one, its in zip(cast.actors, kinds, strict=True) if its == kind]
-        tracks = [*others, *(way for one in alike for way in (one.track, *_held(one)))]
+        tracks = [*others]
+        for one in alike:
+            tracks += [one.track, *(way for _, way in one.held)]
         every = {name: twist for way in tracks for name, twist in way.twists.items()}
         colors: dict[str, Color] = track_colors(every)
         if len(cast.actors) == 1:
@@ -210,10 +212,6 @@ def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], l
             {"name": shown_name(name), "color": hex_color(color)} for name, color in colors.items()
         ]
     return entries, [of_kind[kind] for kind in kinds]
-
-
-def _held(one: Actor) -> list[Track]:
-    return [track for _, track in one.held]
 
 
 def _motion(
@@ -273,8 +271,7 @@ def _mark(cast: Cast) -> float:
     if len(cast.actors) == 1:
         return cast.size
     extent = float(np.ptp(cast.box, axis=0).max())
-    reach = max(one.reach for one in cast.actors)
-    return min(extent, max(BODIES * reach, LEAST_MARK * extent))
+    return min(extent, max(BODIES * max(one.reach for one in cast.actors), LEAST_MARK * extent))
 
 
 def _add_vehicles(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Polygon, Shape
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, rings_of
@@ -239,8 +240,6 @@ def clearance_entry(
     """Least distance at each of the `times` (n,) [s]; None if there is never an obstacle."""
     if not obstacles:
         return None
-    import shapely
-
     placed = [solids_at(ring, poses) for ring, poses in bodies]
     least = np.full(len(times), np.inf)
     flat: list[Any] = []
@@ -269,15 +268,11 @@ def clearance_entry(
 
 def _apart(placed: Sequence[Any], geometries: Sequence[Any]) -> Array:
     """Least distance (n,) between any of the bodies and any of the geometries, each one or (n,)."""
-    import shapely
-
     each = [shapely.distance(body, one) for body in placed for one in geometries]
     return np.asarray(np.min(each, axis=0))
 
 
 def _solid(shape: Shape) -> list[Any]:
-    import shapely
-
     if isinstance(shape, Disc):
         return [shapely.Point(shape.center).buffer(shape.radius, quad_segs=DISC_SEGMENTS)]
     return outlines(shape)
@@ -285,8 +280,6 @@ def _solid(shape: Shape) -> list[Any]:
 
 def _moved(one: Obstacle, times: Array) -> list[Any]:
     """Parts of a moving obstacle, each as a geometry (n,) at the times."""
-    import shapely
-
     assert one.motion is not None
     frames = SE2(one.motion.at(times)[:, None])
     return [
