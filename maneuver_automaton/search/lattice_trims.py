@@ -136,8 +136,9 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     Where maneuvers do, each has the price of the switch to it and of those within it; a switch to a
     coast, and a change of direction between two maneuvers, are left to whoever compares plans.
     """
-    rest = library.automaton.rest if library.automaton.is_kinematic else None
+    rest = None
     if library.automaton.is_kinematic:
+        rest = library.automaton.rest
         library = replace(library, arrays=_with_prices(library.arrays, cost))
     return PricedTrims(
         library=library,

@@ -229,9 +229,8 @@ def shortest_trims(automaton: Automaton, cost: StageCost) -> ShortestTrims | Non
     """The trims of a car's shortest paths; None where one is missing, or two do the same."""
     library = moving_trims(automaton, cost)
     speeds, radius = library.twists[:, 0], least_radius(library.twists)
-    endless = all(trim.max_duration == math.inf for trim in automaton.trims)
-    at_will = automaton.is_kinematic and endless and not prices_switches(cost)
-    if radius == 0.0 or library.climbs or not at_will:
+    able = automaton.is_kinematic and not (library.climbs or prices_switches(cost))
+    if radius == 0.0 or not able or any(one.max_duration < math.inf for one in automaton.trims):
         return None
     prices, bends = library.rates / np.abs(speeds), radius * library.twists[:, 2] / speeds
     least = float(prices.min())
