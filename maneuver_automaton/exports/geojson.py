@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
@@ -122,8 +123,6 @@ def _path(shown: Shown) -> Iterator[dict[str, Any]]:
 
 def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
     """The region that all bodies sweep, and where they are when primitives begin and end."""
-    import shapely
-
     if swept := shown.swept:
         yield feature_of(geometry_of(shapely.union_all(swept)), kind="swept")
     times = shown.track.switching_times
@@ -149,8 +148,6 @@ def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
 
 
 def _around(recording: Recording) -> Iterator[dict[str, Any]]:
-    import shapely
-
     for one, geometry, time in solids_of(recording):
         facts: dict[str, Any] = {"name": one.name}
         if isinstance(one, Obstacle) and one.height is not None:
@@ -173,8 +170,6 @@ def feature_of(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[
 
 def _located(geometry: Mapping[str, Any], origin: ArrayLike) -> dict[str, Any]:
     """A geometry in metres, in degrees about an origin; altitudes stay."""
-    import shapely
-
     dense = shapely.geometry.shape(geometry)
     if dense.length > LONGEST_M:
         dense = shapely.segmentize(dense, LONGEST_M)
@@ -205,6 +200,4 @@ def _point(pose: Array) -> dict[str, Any]:
 
 def geometry_of(geometry: Any) -> Any:
     """A geometry of shapely, outer rings to the left as RFC 7946 wants them."""
-    import shapely
-
     return json.loads(shapely.to_geojson(shapely.orient_polygons(geometry)))

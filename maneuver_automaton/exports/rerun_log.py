@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import PART
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
@@ -17,6 +18,7 @@ from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, soli
 from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color, track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.recording import Mover, Recording, recording_to_write
+from maneuver_automaton.words.library import four_columns
 
 APPLICATION = "maneuver_automaton"
 TIMELINE = "plan"  # [s] on the clock of the plan
@@ -230,8 +232,6 @@ def _blueprint(views: Any) -> Any:
 
 def _rings(geometry: Any, z: float) -> list[Array]:
     """Rings (n, 3) of a geometry of shapely at a height [m]."""
-    import shapely
-
     lines = shapely.get_parts(shapely.boundary(geometry)).tolist()
     return [_raised(shapely.get_coordinates(line)[:-1], z) for line in lines]
 
@@ -241,8 +241,7 @@ def _raised(ring: Array, z: float) -> Array:
 
 
 def _places(poses: Array) -> Array:
-    altitude = poses[:, 3] if poses.shape[1] > 3 else np.zeros(len(poses))
-    return np.column_stack([poses[:, :2], altitude])
+    return four_columns(poses)[:, [0, 1, 3]]
 
 
 def _bytes(color: Color) -> list[int]:

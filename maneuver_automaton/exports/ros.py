@@ -20,6 +20,7 @@ from maneuver_automaton.exports.table import accelerations, component, twist_rat
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
+from maneuver_automaton.words.library import four_columns
 
 TYPES = {  # by topic
     "path": "nav_msgs/msg/Path",
@@ -286,26 +287,21 @@ def _rates(time: Array, pose: Array) -> Array:
 
 def _transforms(pose: Array) -> list[Message]:
     """Transforms of poses (n, dof): a quaternion about z."""
-    altitude = pose[:, 3] if pose.shape[1] > 3 else np.zeros(len(pose))
-    half = 0.5 * np.remainder(pose[:, 2] + np.pi, 2.0 * np.pi) - 0.5 * np.pi
-    table = zip(*(column.tolist() for column in (
-        pose[:, 0], pose[:, 1], altitude, np.sin(half), np.cos(half)
-    )), strict=True)  # fmt: skip
+    x, y, heading, z = four_columns(pose).T
+    half = 0.5 * np.remainder(heading + np.pi, 2.0 * np.pi) - 0.5 * np.pi
     return [
         {
             "translation": {"x": x, "y": y, "z": z},
             "rotation": {"x": 0.0, "y": 0.0, "z": sin, "w": cos},
         }
-        for x, y, z, sin, cos in table
+        for x, y, z, sin, cos in np.column_stack([x, y, z, np.sin(half), np.cos(half)]).tolist()
     ]
 
 
 def _twists(twist: Array) -> list[Message]:
-    climb = twist[:, 3] if twist.shape[1] > 3 else np.zeros(len(twist))
-    table = zip(*(c.tolist() for c in (*twist[:, :3].T, climb)), strict=True)
     return [
         {"linear": {"x": x, "y": y, "z": z}, "angular": {"x": 0.0, "y": 0.0, "z": turn}}
-        for x, y, turn, z in table
+        for x, y, turn, z in four_columns(twist).tolist()
     ]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, united
 from maneuver_automaton.groups import SE2
@@ -60,8 +61,6 @@ def shown_of(mover: Mover) -> Shown:
 
 def solid(shape: Shape) -> Any:
     """A valid geometry of shapely that a shape fills; a disc has 48 corners."""
-    import shapely
-
     if isinstance(shape, Disc):
         return shapely.Polygon(footprint_polygons([shape])[0])
     return united(outlines(shape))
@@ -69,8 +68,6 @@ def solid(shape: Shape) -> Any:
 
 def solid_map(cells: OccupancyMap) -> Any:
     """The geometry of shapely that the blocked cells of a map fill."""
-    import shapely
-
     low_x, low_y, high_x, high_y = (cells.resolution * blocked_rectangles(cells.blocked)).T
     whole = united(shapely.box(low_x, low_y, high_x, high_y))
     return shapely.transform(whole, SE2(cells.origin).act)
