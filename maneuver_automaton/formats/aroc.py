@@ -208,11 +208,8 @@ def _primitive(folder: Path | zipfile.Path, listed: Element, n: int) -> ArocPrim
     time = np.array([row.need("time").number() for row in rows])
     for k in range(1, len(rows)):
         if not time[k] > time[k - 1]:
-            raise (
-                rows[k]
-                .need("time")
-                .error(f"got {time[k]:g}, need more than {time[k - 1]:g}, that of the state before")
-            )
+            said = f"got {time[k]:g}, need more than {time[k - 1]:g}, that of the state before"
+            raise rows[k].need("time").error(said)
     inputs = root.need("trajectory", "inputs")
     given = [[row.need(name).number() for name in INPUTS] for row in inputs.children]
     steps = len(rows) - 1

@@ -28,9 +28,9 @@ from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.yaml_source import (
     Document,
     Where,
+    check_names,
     numbers_at,
     positive_at,
-    shown,
     value_at,
 )
 from maneuver_automaton.problem import Bounds
@@ -46,15 +46,8 @@ def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
     agents = value_at(document, ("agents",), list, "a list of agents")
     if not agents:
         raise document.error(("agents",), "got no agent, need at least one")
-    names: dict[str, int] = {}
-    for k in range(len(agents)):
-        name = value_at(document, ("agents", k, "name"), str, "a name")
-        if name in names:
-            raise document.error(
-                ("agents", k, "name"),
-                f"got {shown(name)}, the name of agents[{names[name]}] too, need another one",
-            )
-        names[name] = k
+    names = [value_at(document, ("agents", k, "name"), str, "a name") for k in range(len(agents))]
+    check_names(document, "agents", names)
     numbers_at(document, ("map", "dimensions"), 2, "[width, height]")
     width, height = (positive_at(document, ("map", "dimensions", k)) for k in range(2))
     obstacles, sense = _obstacles(document)
@@ -71,7 +64,7 @@ def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
             start=_pose(document, ("agents", k, "start"), sense),
             goal=_pose(document, ("agents", k, "goal"), sense),
         )
-        for name, k in names.items()
+        for k, name in enumerate(names)
     )
     return (replace(world, fleet=tuple(fleet)),)
 

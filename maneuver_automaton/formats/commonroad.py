@@ -26,7 +26,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
-from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad_rules import (
     SIGN,
     limits_of,
@@ -36,6 +35,7 @@ from maneuver_automaton.formats.commonroad_rules import (
     signs_of,
     stop_lines,
 )
+from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.statement import Statement, simple_polygon
 from maneuver_automaton.formats.text_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
@@ -99,21 +99,17 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
             source=", ".join(
                 root.attributes[key] for key in ("author", "source") if root.attributes.get(key)
             ),
-            benchmark=_benchmark(root, problem, name),
+            benchmark=RoadBenchmark(
+                scenario=name, version=root.attributes.get(VERSION, ""), problem=problem.whole("id")
+            )
+            if "id" in problem.attributes
+            else None,
             stop_lines=lines,
             notes=tuple(dict.fromkeys(notes)),
         )
         for k, problem in enumerate(problems)
     ]
     return tuple(Statement(format=FORMAT, name=scene.name, road=scene) for scene in scenes)
-
-
-def _benchmark(root: Element, problem: Element, name: str) -> RoadBenchmark | None:
-    """What names a problem in solutions; none where it has no id."""
-    if "id" not in problem.attributes:
-        return None
-    version = root.attributes.get(VERSION, "")
-    return RoadBenchmark(scenario=name, version=version, problem=problem.whole("id"))
 
 
 def _lanelets(root: Element) -> dict[int, Lanelet]:
@@ -129,7 +125,7 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
         allowed = [limit for k in refs(element, SIGN) for limit in limits_of(signs.get(k, []))]
         if stated is not None and stated.text.strip().lower() != "inf":
             allowed.append(stated.number())
-        try:
+        with errors_at(element.at):
             lanelets[number] = Lanelet(
                 number,
                 _points(element.need("leftBound")),
@@ -139,8 +135,6 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
                 against=[one.whole("ref") for one in beside if _runs(one, "opposite")],
                 speed_limit=min(allowed, default=None),
             )
-        except ValueError as error:
-            raise _at(element, error) from error
     if not lanelets:
         raise root.error("holds no lanelet, need at least one")
     return lanelets
@@ -187,7 +181,7 @@ def _traffic(
         if len(poses) < len(states):
             notes.append(f"{name} has uncertain states: it is kept clear of wherever it may be")
         times = step * np.array([_interval(one.need("time")) for one in states])
-        try:
+        with errors_at(element.at):
             if len(states) == 1:
                 for shape in _shapes_at(states[0], shapes, lanelets):
                     if predicted is None:
@@ -205,8 +199,6 @@ def _traffic(
                     between = _convex(np.concatenate([_corners(one) for one in here + there]))
                     lasting = Motion([times[k, 0], times[k + 1, 1]], np.zeros((2, 3)))
                     yield Obstacle(between, motion=lasting, name=name)
-        except ValueError as error:
-            raise _at(element, error) from error
         if predicted is not None and recorded is None:
             yield from _occupancies(predicted, step, name)
 
@@ -307,7 +299,7 @@ def _shapes(element: Element) -> Iterator[Shape]:
         middle = part.get("center")
         center = (0.0, 0.0) if middle is None else point_of(middle)
         turn = part.get("orientation")
-        try:
+        with errors_at(part.at):
             if part.tag == "rectangle":
                 size = [part.need("length").number(), part.need("width").number()]
                 yield Box(size, center, 0.0 if turn is None else turn.number())
@@ -315,8 +307,6 @@ def _shapes(element: Element) -> Iterator[Shape]:
                 yield Disc(part.need("radius").number(), center)
             else:
                 yield simple_polygon([point_of(one) for one in part.all("point")])
-        except ValueError as error:
-            raise _at(part, error) from error
     if not found:
         raise element.error("holds no rectangle, circle or polygon, need one")
 
@@ -364,7 +354,7 @@ def _goals(
         elif position is not None and k < len(regions):  # commonroad-io reads no goalRegion
             position = None
             notes.append(f"goal {k + 1}: any place counts, since the file lacks its lanelets")
-        try:
+        with errors_at(state.at):
             yield GoalRegion(
                 places=None if position is None else tuple(_places(position, lanelets)),
                 heading=None if heading is None else _interval(heading),
@@ -372,8 +362,6 @@ def _goals(
                 time=(step * begin, step * end),
                 lanelets=() if position is None else tuple(refs(position, "lanelet")),
             )
-        except ValueError as error:
-            raise _at(state, error) from error
 
 
 def _places(position: Element, lanelets: Mapping[int, Lanelet]) -> Iterator[Shape]:
@@ -381,10 +369,8 @@ def _places(position: Element, lanelets: Mapping[int, Lanelet]) -> Iterator[Shap
         number = one.whole("ref")
         if number not in lanelets:
             raise one.error(f"ref: got {number}, but no lanelet of the file has this id")
-        try:
+        with errors_at(one.at):
             yield simple_polygon(lanelets[number].ring)
-        except ValueError as error:
-            raise _at(one, error) from error
     if (middle := position.get("point")) is not None:
         raise middle.error("is not read as a goal, need a shape or a lanelet")
     if any(one.tag != "lanelet" for one in position.children):
@@ -396,7 +382,3 @@ def _interval(element: Element) -> tuple[float, float]:
     if exact is not None:
         return exact.number(), exact.number()
     return element.need("intervalStart").number(), element.need("intervalEnd").number()
-
-
-def _at(element: Element, error: ValueError) -> InvalidScenario:
-    return error if isinstance(error, InvalidScenario) else element.error(str(error))

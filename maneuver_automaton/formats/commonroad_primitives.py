@@ -199,14 +199,9 @@ def automaton_of_commonroad_primitives(
     index = {tuple(pair): k for k, pair in enumerate(pairs.tolist())}
     maneuvers = []
     for k, (course, pair) in enumerate(zip(_courses_between(model, file, ends), ends, strict=True)):
-        maneuvers.append(
-            Maneuver.along(
-                course,
-                name=f"primitive {k + 1}",
-                source=trims[index[tuple(pair[0].tolist())]].name,
-                target=trims[index[tuple(pair[1].tolist())]].name,
-            )
-        )
+        source, target = (trims[index[tuple(end)]].name for end in pair.tolist())
+        label = f"primitive {k + 1}"
+        maneuvers.append(Maneuver.along(course, name=label, source=source, target=target))
     return Automaton(model, trims, tuple(maneuvers), name=name)
 
 
@@ -268,11 +263,8 @@ def _primitive(row: Element) -> RoadPrimitive:
     states = np.array([[state.need(name).number() for name in FIELDS] for state in rows])
     for k, name in enumerate(FIELDS[:3]):
         if states[0, k] != 0.0:
-            raise (
-                rows[0]
-                .need(name)
-                .error(f"got {states[0, k]:g}, need 0: a primitive begins at the origin")
-            )
+            said = f"got {states[0, k]:g}, need 0: a primitive begins at the origin"
+            raise rows[0].need(name).error(said)
     for state, (speed, steering) in zip(rows, states[:, 3:].tolist(), strict=True):
         if abs(speed) > FASTEST:
             said = f"got {speed:g} m/s, need at most {FASTEST:g} m/s in size"

@@ -297,11 +297,12 @@ def write_document(
     write_text_atomically(Path(path), _object(said, "") + "\n")
 
 
-def _object(document: Mapping[str, Any], left: str) -> str:
-    """An object, a key a line, `left` of which that many spaces stand."""
+def _object(document: Mapping[str, Any], left: str, *, of_objects: bool = False) -> str:
+    """An object, a key a line, `left` of which that many spaces stand; or one `of_objects`."""
     inside = left + "  "
     rows = (
-        f"{inside}{json.dumps(key, ensure_ascii=False)}: {_json(key, value, inside)}"
+        f"{inside}{json.dumps(key, ensure_ascii=False)}: "
+        + (_object(value, inside) if of_objects else _json(key, value, inside))
         for key, value in document.items()
     )
     return "{\n" + ",\n".join(rows) + f"\n{left}}}"
@@ -312,13 +313,6 @@ def _json(key: str, value: Any, left: str) -> str:
     if key in A_LINE_EACH and value and isinstance(value, list):
         rows = ",\n".join(f"{left}  {_json('', row, '')}" for row in value)
         return f"[\n{rows}\n{left}]"
-    if key == "trajectory":
-        return _object(value, left)
-    if key == "vehicles":
-        inside = left + "  "
-        rows = ",\n".join(
-            f"{inside}{json.dumps(name, ensure_ascii=False)}: {_object(row, inside)}"
-            for name, row in value.items()
-        )
-        return "{\n" + rows + f"\n{left}}}"
+    if key in ("trajectory", "vehicles"):
+        return _object(value, left, of_objects=key == "vehicles")
     return json.dumps(value, ensure_ascii=False, allow_nan=False)

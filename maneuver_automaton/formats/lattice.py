@@ -322,10 +322,8 @@ def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
             xs = x + side * (np.sin(headings) - math.sin(heading))
             ys = y - side * (np.cos(headings) - math.cos(heading))
         else:
-            xs, ys = (
-                x + shares * length * math.cos(heading),
-                y + shares * length * math.sin(heading),
-            )
+            xs = x + shares * length * math.cos(heading)
+            ys = y + shares * length * math.sin(heading)
         poses.append(np.column_stack([xs, ys, headings]))
     whole = np.concatenate(poses)
     whole[-1] = [*turn.cells, first + angle]

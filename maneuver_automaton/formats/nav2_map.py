@@ -104,8 +104,7 @@ def load_nav2_mask(path: Path) -> Mask:
     document = _document(path)
     header = _header(document)
     image = _image(document, path, header)
-    occupancy = _occupancy(image, header)
-    known = occupancy <= 1.0 if header.mode == "raw" else image.opaque
+    occupancy, known = _occupancy(image, header)
     if header.mode == "raw":
         share = occupancy
     else:
@@ -213,17 +212,17 @@ def _number(document: Document, where: tuple[str | int, ...], most: float = math
     return float(value)
 
 
-def _occupancy(image: GreyImage, header: _Header) -> Array:
-    """Shares of occupancy, the first row at the top; raw values above 100 are more than 1."""
+def _occupancy(image: GreyImage, header: _Header) -> tuple[Array, NDArray[np.bool_]]:
+    """Shares of occupancy, the first row at the top, and whether they are known."""
     if header.mode == "raw":
-        return np.asarray(np.round(image.shade * 255.0) / 100.0)
-    return image.shade if header.negate else 1.0 - image.shade
+        shares = np.round(image.shade * 255.0) / 100.0
+        return shares, shares <= 1.0
+    return image.shade if header.negate else 1.0 - image.shade, image.opaque
 
 
 def _blocked(image: GreyImage, header: _Header, *, unknown: Unknown) -> NDArray[np.bool_]:
     """Blocked cells, the first row at the top."""
-    occupancy = _occupancy(image, header)
-    known = occupancy <= 1.0 if header.mode == "raw" else image.opaque
+    occupancy, known = _occupancy(image, header)
     blocked = occupancy >= header.occupied
     if unknown == "blocked":
         blocked |= occupancy > header.free

@@ -214,35 +214,27 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
         ],
         timing_s=dict.fromkeys(TIMINGS) | result.timing_s,
         counts=dict.fromkeys(COUNTS, 0) | result.counts,
-        cost_parts=_cost_parts(result),
+        **_cost_parts(result),
     )
     if result.narrowest is None:
         del document["narrowest"]
     if not result.problem.via:
         del document["via"]
-    if not (result.problem.place_costs and result.plan):
-        del document["cost_parts"]
     if document["audit"] and document["audit"].get("place_price") is None:
         document["audit"].pop("place_price", None)
     return document
 
 
-def _cost_parts(result: PlanResult) -> CostPartsEntry:
+def _cost_parts(result: PlanResult) -> dict[str, CostPartsEntry]:
+    """The key of the parts of a plan's cost; none where places cost nothing."""
     problem, plan = result.problem, result.plan
-    if plan is None:
-        return {"invariant": 0.0, "places": []}
-    return {
-        "invariant": problem.invariant_cost_of(plan),
-        "places": [
-            {
-                "kind": type(cost).__name__,
-                "per": cost.per,
-                "price": found.price,
-                "error": found.error,
-            }
-            for cost, found in zip(problem.place_costs, problem.place_prices_of(plan), strict=True)
-        ],
-    }
+    if plan is None or not problem.place_costs:
+        return {}
+    prices = [
+        entry(PlacePriceEntry, found, kind=type(cost).__name__, per=cost.per)
+        for cost, found in zip(problem.place_costs, problem.place_prices_of(plan), strict=True)
+    ]
+    return {"cost_parts": {"invariant": problem.invariant_cost_of(plan), "places": prices}}
 
 
 def save_plan(

@@ -17,6 +17,8 @@ from typing import Any, Protocol, TypeAlias
 
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats import commonroad_primitives as primitives
+from maneuver_automaton.formats import movingai, nav2_map
 from maneuver_automaton.formats.statement import Statement, Unknown
 from maneuver_automaton.formats.yaml_source import Document
 
@@ -150,10 +152,8 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
             return one
     said = NOT_READ.get(ending)
     if ending == ".xml":
-        from maneuver_automaton.formats.commonroad_primitives import is_commonroad_primitives
-
         with contextlib.suppress(OSError, ValueError):  # told by who reads it
-            said = NOT_READ[".mprim"] if is_commonroad_primitives(path) else None
+            said = NOT_READ[".mprim"] if primitives.is_commonroad_primitives(path) else None
     if said:
         raise InvalidScenario(f"{path}: {said}")
     of_it = [one for one in BUILT_IN if ending in one.endings.split()]
@@ -230,13 +230,9 @@ def load_map(path: Path | str, *, unknown: Unknown = "blocked") -> OccupancyMap:
     if unknown not in ("blocked", "free"):
         raise InvalidScenario(f"{path}: unknown: got {unknown!r}, need 'blocked' or 'free'")
     if path.suffix.lower() in YAML_ENDINGS:
-        from maneuver_automaton.formats.nav2_map import load_nav2_map
-
-        return load_nav2_map(path, unknown=unknown)
+        return nav2_map.load_nav2_map(path, unknown=unknown)
     if path.suffix.lower() == ".map":
-        from maneuver_automaton.formats.movingai import load_movingai_map
-
-        return load_movingai_map(path)
+        return movingai.load_movingai_map(path)
     raise InvalidScenario(
         f"{path}: is no map, need a file of Nav2 ({', '.join(YAML_ENDINGS)}) or MovingAI "
         "(.map); OccupancyMap.of_picture reads an image"

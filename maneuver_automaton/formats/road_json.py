@@ -23,7 +23,7 @@ from maneuver_automaton.formats.documents import (
     document_of,
     vehicle_entry,
 )
-from maneuver_automaton.formats.entries import Flag, Known, Number, Whole, entry, number, says
+from maneuver_automaton.formats.entries import Flag, Known, Number, Whole, entry, number, of, says
 from maneuver_automaton.formats.plan_json import (
     PlanDocument,
     PrimitiveEntry,
@@ -49,10 +49,10 @@ GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable"
 class RoadAuditEntry(TypedDict):
     """What the judge found."""
 
-    passed: Flag
+    passed: Annotated[Flag, of("clean")]
     max_dynamics_defect: Number
-    min_clearance_m: Annotated[Known, says("to any road user")]
-    min_edge_m: Annotated[Known, says("of the body to the edge of the road")]
+    min_clearance_m: Annotated[Known, of("clearance_m"), says("to any road user")]
+    min_edge_m: Annotated[Known, of("edge_m"), says("of the body to the edge of the road")]
     off_road: Annotated[Whole, says("1 if the road was left")]
     pieces: NotRequired[Annotated[Whole, says("of a drive: steps")]]
     failed: NotRequired[Annotated[Whole, says("of a drive: faults")]]
@@ -298,10 +298,5 @@ def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> DriveStepEntry:
 
 
 def _audit(verdict: RoadVerdict) -> RoadAuditEntry:
-    return {
-        "passed": verdict.clean,
-        "max_dynamics_defect": verdict.audit.max_dynamics_defect,
-        "min_clearance_m": number(verdict.clearance_m),
-        "min_edge_m": number(verdict.edge_m),
-        "off_road": int(verdict.off_road),
-    }
+    defect = verdict.audit.max_dynamics_defect
+    return entry(RoadAuditEntry, verdict, max_dynamics_defect=defect)

@@ -20,6 +20,7 @@ from maneuver_automaton._files import open_input
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.statement import Statement, simple_polygon
 from maneuver_automaton.formats.text_source import finite, lines_of, read_text, whole
 
@@ -94,10 +95,6 @@ def _obstacles(corners: list[tuple[str, str]], counts: list[int]) -> list[Obstac
         done += 2 * count
         ring: Array = np.array([finite(token, at=at) for token, at in part]).reshape(-1, 2)
         name = f"obstacle {k + 1}"
-        try:
+        with errors_at(f"{part[0][1]}: {name}"):
             obstacles.append(Obstacle(simple_polygon(ring), name=name))
-        except ValueError as error:
-            if isinstance(error, InvalidScenario):
-                raise
-            raise InvalidScenario(f"{part[0][1]}: {name}: {error}") from error
     return obstacles

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
 
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.text_source import FARTHEST, MAX_BYTES, too_long
+from maneuver_automaton.formats.text_source import FARTHEST, MAX_BYTES, brief, too_long
 
 MAX_DEPTH = 40
 NESTED = f"lists and mappings are nested more than {MAX_DEPTH} deep"
@@ -85,17 +85,13 @@ def shown(value: Any) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, list):
-        return _short("[" + ", ".join(shown(item) for item in value[:MAX_SHOWN]) + "]")
+        return brief("[" + ", ".join(shown(item) for item in value[:MAX_SHOWN]) + "]", MAX_SHOWN)
     if isinstance(value, dict):
         items = (f"{key}: {shown(value[key])}" for key in list(value)[:MAX_SHOWN])
-        return _short("{" + ", ".join(items) + "}")
+        return brief("{" + ", ".join(items) + "}", MAX_SHOWN)
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
-    return _short(repr(value))
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
+    return brief(repr(value), MAX_SHOWN)
 
 
 def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
@@ -304,6 +300,14 @@ def numbers_at(document: Document, where: Where, n: int, need: str) -> tuple[flo
     if len(values) != n:
         raise document.error(where, f"got {len(values)} numbers, need {n}: {need}")
     return tuple(number_at(document, (*where, k)) for k in range(n))
+
+
+def check_names(document: Document, key: str, names: Sequence[str]) -> None:
+    """Refuse entries of a list of which two have one name; raises InvalidScenario."""
+    for k, name in enumerate(names):
+        if (first := names.index(name)) < k:
+            said = f"the name of {key}[{first}] too, need another one"
+            raise document.error((key, k, "name"), f"got {shown(name)}, {said}")
 
 
 def sizes_at(document: Document, where: Where) -> tuple[float, ...]:
