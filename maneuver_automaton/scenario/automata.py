@@ -15,6 +15,7 @@ import numpy as np
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library, load_stock_library, stock_libraries
+from maneuver_automaton.formats import lattice, libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import (
     Car,
@@ -67,7 +68,13 @@ def automaton_of(
             f"{model.name}; maneuvers of others come from a library file, or there are none",
         )
     if part.file is not None:
-        return _from_library(document, folder / part.file, model)
+        path = folder / part.file
+        with at(document, (*WHERE, "file")):
+            if (read := libraries.read_primitives(path, model)) is not None:
+                return _fitting(read.automaton, model)
+            if is_known(model):
+                return _fitting(load_library(path), model)
+            return load_library(path, model=model)
     if part.preset is not None:
         with at(document, (*WHERE, "preset")):
             if part.preset in stock_libraries():
@@ -235,18 +242,6 @@ def _values(axis: Axis) -> list[float]:
     return [float(low + k * step) for k in range(n)]
 
 
-def _from_library(document: Document, path: Path, model: Model) -> Automaton:
-    from maneuver_automaton.formats.libraries import read_primitives
-
-    with at(document, (*WHERE, "file")):
-        read = read_primitives(path, model)
-        if read is not None:
-            return _fitting(read.automaton, model)
-        if is_known(model):
-            return _fitting(load_library(path), model)
-        return load_library(path, model=model)
-
-
 def _fitting(automaton: Automaton, model: Model) -> Automaton:
     """The automaton of a library, if it is one of this vehicle."""
     if not is_known(model):
@@ -317,14 +312,12 @@ def preset_automaton(name: str, model: Model) -> Automaton:
 
 
 def _lattice(model: LatticeBody, *, spins: bool) -> Automaton:
-    from maneuver_automaton.formats.lattice import automaton_of_lattice, lattice_of_arcs
-
     if model.turning_radius is None:
         raise ValueError("needs the least radius of its arcs, state vehicle.turning_radius_m")
-    lattice = lattice_of_arcs(
+    made = lattice.lattice_of_arcs(
         resolution=model.resolution, turning_radius=model.turning_radius, spins=spins
     )
-    return automaton_of_lattice(lattice)
+    return lattice.automaton_of_lattice(made)
 
 
 def _crab(car: FourWheelSteeringCar) -> Controls:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
-from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
+from pydantic import AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
@@ -40,12 +40,15 @@ from maneuver_automaton.scenario.parts import (
     Need,
     NotNegative,
     Number,
+    Pose2D,
     Positive,
     Several,
     Text,
     Truth,
     at,
     checked,
+    exactly,
+    holding,
     made,
     need,
     optional,
@@ -64,16 +67,12 @@ def _grid(value: Any) -> Any:
     return value
 
 
-def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
-    if len(set(values)) < len(values):
-        raise need("a list of numbers, each of them once")
-    return values
-
-
 Mapped = Annotated[
     dict[str, Any], Need("a mapping with the key kind, and the parameters of this kind")
 ]
-_Once = AfterValidator(_each_once)
+_Once = holding(
+    lambda values: len(set(values)) == len(values), "a list of numbers, each of them once"
+)
 Grid = Annotated[
     dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1), _Once]],
     BeforeValidator(_grid),
@@ -106,10 +105,7 @@ class JoiningPart(FilePart):
 
 
 Factor = Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a factor of at least 1")]
-_THREE = Several("a pose [x, y, heading], three numbers", at_least=3, at_most=3)
-_TaskPose = Annotated[tuple[Number, Number, Number], _THREE]
-_TWO = Several("a task [start, goal], two poses", at_least=2, at_most=2)
-_Task = Annotated[tuple[_TaskPose, _TaskPose], _TWO]
+_Task = Annotated[tuple[Pose2D, Pose2D], exactly(2, "a task [start, goal], two poses")]
 
 
 class DesignPart(FilePart):

@@ -12,13 +12,13 @@ from pydantic import Field
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem
+from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.statement import MapFile, Statement
-from maneuver_automaton.formats.yaml_source import Document, Where, shown
+from maneuver_automaton.formats.yaml_source import Document, Where, check_names
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.simulation import Disturbance
+from maneuver_automaton.receding_horizon import settings, simulation
 from maneuver_automaton.scenario.parts import (
     Count,
     FilePart,
@@ -209,7 +209,7 @@ class FleetScenario:
         return {name: one.breaks_s for name, one in self.loops.items() if one.breaks_s is not None}
 
     @property
-    def disturbances(self) -> dict[str, Disturbance]:
+    def disturbances(self) -> dict[str, simulation.Disturbance]:
         """What disturbs each vehicle in closed loop, by name; their own, or else that of the top.
 
         The seed of the top is that of the loop: each vehicle has numbers of its own.
@@ -247,7 +247,8 @@ def fleet_of_document(
         )
         for k, one in enumerate(file.vehicles)
     ]
-    names = _names(document, file.vehicles)
+    names = [one.name or str(k + 1) for k, one in enumerate(file.vehicles)]
+    check_names(document, "vehicles", names)
     for k, one in enumerate(alone):
         fixed = one.problem.horizon.time
         if fixed is not None:
@@ -292,7 +293,7 @@ def fleet_of_statement(
     loop: FleetLoopPart | None = None,
 ) -> FleetScenario:
     """The fleet that a file `path` of another format states, with the scenario `beside` it."""
-    settings = settings or FleetPart()
+    part = settings or FleetPart()
     kinds: dict[int, tuple[Scenario, Automaton]] = {}  # by the vehicle that the file names
     alone = []
     for one in statement.fleet:
@@ -302,19 +303,17 @@ def fleet_of_statement(
             its = replace(its, problem=replace(its.problem, automaton=automaton))
         kinds[id(one.vehicle)] = (rest, its.problem.automaton)
         alone.append(its)
-    try:
+    with errors_at(path):
         fleet = FleetProblem(
             [one.problem for one in alone],
             names=[one.name for one in alone],
-            margin=_between(settings, alone),
+            margin=_between(part, alone),
         )
-    except ValueError as error:
-        raise InvalidScenario(f"{path}: {error}") from error
     return FleetScenario(
         name=statement.name,
         fleet=fleet,
         vehicles=tuple(alone),
-        settings=settings,
+        settings=part,
         receding_horizon=loop,
         maps=_maps(alone),
         path=path,
@@ -339,9 +338,6 @@ def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPar
 
 def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> None:
     """Raise where the loop of a file does not suit its vehicles."""
-    from maneuver_automaton.receding_horizon.settings import switches_at_will
-    from maneuver_automaton.receding_horizon.simulation import checked as matched
-
     loop = file.receding_horizon
     for k, one in enumerate(file.vehicles):
         if one.receding_horizon is not None and loop is None:
@@ -371,8 +367,8 @@ def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> Non
             where: Where = (LOOP, "disturbance")
             where = where if own is None else ("vehicles", k, *where)
             with at(document, where):
-                matched(disturbance_of(noise), problem.start.size)
-                if noise.twist_scale is not None and not switches_at_will(problem):
+                simulation.checked(disturbance_of(noise), problem.start.size)
+                if noise.twist_scale is not None and not settings.switches_at_will(problem):
                     raise ValueError(
                         f"twist_scale: got {list(noise.twist_scale)}, need no such key for a "
                         "vehicle with inertia: a maneuver is driven as its model says"
@@ -411,17 +407,3 @@ def _entry(document: Document, k: int, entry: VehicleEntry) -> Document:
         value["start"] = {**value["start"], "time_s": entry.start_time_s}
         homes["start", "time_s"] = (*where, "start_time_s")
     return replace(document, value=value, homes=homes)
-
-
-def _names(document: Document, entries: Sequence[VehicleEntry]) -> tuple[str, ...]:
-    """The names of all, each another one; the number of those that have none."""
-    names: dict[str, int] = {}
-    for k, entry in enumerate(entries):
-        name = entry.name or str(k + 1)
-        if name in names:
-            raise document.error(
-                ("vehicles", k, "name"),
-                f"got {shown(name)}, the name of vehicles[{names[name]}] too, need another one",
-            )
-        names[name] = k
-    return tuple(names)

@@ -17,6 +17,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats import commonroad
 from maneuver_automaton.formats.registry import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
@@ -89,7 +90,13 @@ def load_scenario(
         found = yaml_statements(document, path)
         if found is None:
             if isinstance(document.value, dict) and "schema" in document.value:
-                _refuse_parts(path, beside, case)
+                if beside is not None:
+                    raise InvalidScenario(
+                        f"--with: serves formats that state a part of a problem, but {path} is a "
+                        "scenario, which states all of it"
+                    )
+                if case is not None and case != 0:
+                    raise _no_case(path, 1, case)
             if states_several(document):
                 return fleet.fleet_of_document(document, path=path, begin=begin, own=model)
             return scenario_of_document(document, path=path, begin=begin, own=model)
@@ -131,12 +138,10 @@ def load_roads(path: Path | str, *, beside: Path | str | None = None) -> tuple[R
     InvalidScenario
         As `load_scenario`.
     """
-    from maneuver_automaton.formats.commonroad import read_commonroad
-
     vehicle = roads.RoadVehicle() if beside is None else _road_vehicle(Path(beside))
     return tuple(
         RoadScenario(name=one.name, scene=one.road, vehicle=vehicle)
-        for one in read_commonroad(Path(path))
+        for one in commonroad.read_commonroad(Path(path))
         if one.road is not None
     )
 
@@ -233,16 +238,6 @@ def _headings(value: Any, where: Where) -> Iterator[tuple[Where, float]]:
             continue
         if isinstance(inner, int | float):
             yield at, float(inner)
-
-
-def _refuse_parts(path: Path, beside: Path | str | None, case: int | None) -> None:
-    if beside is not None:
-        raise InvalidScenario(
-            f"--with: serves formats that state a part of a problem, but {path} is a scenario, "
-            "which states all of it"
-        )
-    if case is not None and case != 0:
-        raise _no_case(path, 1, case)
 
 
 def _chosen(path: Path, statements: Sequence[Statement], case: int | None) -> Statement:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
@@ -94,19 +94,25 @@ class Several:
         return value
 
 
-def _within_limits(value: float) -> float:
-    if abs(value) > FARTHEST:
-        raise need(f"a number of at most {FARTHEST:g} in size")
-    return value
+def exactly(count: int, text: str) -> Several:
+    """Annotation: a list of so many items, described by `text`."""
+    return Several(text, at_least=count, at_most=count)
 
 
-def _rising(value: tuple[float, float]) -> tuple[float, float]:
-    if not value[0] < value[1]:
-        raise need("an interval [low, high] with low < high")
-    return value
+def holding(holds: Callable[[Any], bool], text: str) -> AfterValidator:
+    """Annotation: a value of which a condition `holds`; of any other, it has to be `text`."""
+
+    def checked(value: Any) -> Any:
+        if not holds(value):
+            raise need(text)
+        return value
+
+    return AfterValidator(checked)
 
 
-_Small = AfterValidator(_within_limits)
+_Small = holding(
+    lambda value: not abs(value) > FARTHEST, f"a number of at most {FARTHEST:g} in size"
+)
 Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number"), _Small]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number"), _Small]
 NotNegative = Annotated[
@@ -117,19 +123,17 @@ Whole = Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")]
 Truth = Annotated[bool, Strict(), Need("true or false")]
 Text = Annotated[str, Strict(), Need("a text")]
 Name = Annotated[str, Strict(), Field(pattern=r"\S"), Need("a name, a text that is not empty")]
-Point = Annotated[
-    tuple[Number, Number], Several("a point [x, y], two numbers", at_least=2, at_most=2)
+Point = Annotated[tuple[Number, Number], exactly(2, "a point [x, y], two numbers")]
+Pose2D = Annotated[
+    tuple[Number, Number, Number], exactly(3, "a pose [x, y, heading], three numbers")
 ]
 Polygon = Annotated[tuple[Point, ...], Several("a list of at least 3 points [x, y]", at_least=3)]
 Polygons = Annotated[tuple[Polygon, ...], Several("a list of polygons")]
-Size = Annotated[
-    tuple[Positive, Positive],
-    Several("[length, width], two positive numbers", at_least=2, at_most=2),
-]
+Size = Annotated[tuple[Positive, Positive], exactly(2, "[length, width], two positive numbers")]
 Interval = Annotated[
     tuple[Number, Number],
-    Several("an interval [low, high], two numbers", at_least=2, at_most=2),
-    AfterValidator(_rising),
+    exactly(2, "an interval [low, high], two numbers"),
+    holding(lambda ends: ends[0] < ends[1], "an interval [low, high] with low < high"),
 ]
 
 

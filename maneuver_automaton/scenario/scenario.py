@@ -17,6 +17,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats import cl_cbs, tpcap
 from maneuver_automaton.formats.statement import MapFile, StatedVehicle, Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
@@ -53,6 +54,7 @@ from maneuver_automaton.scenario.shapes import (
     zones_of,
 )
 from maneuver_automaton.scenario.vehicles import STATE_UNITS, carried_of, model_of, part_of
+from maneuver_automaton.search import words
 
 T = TypeVar("T")
 Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
@@ -179,7 +181,10 @@ def scenario_of_document(
         ("vehicle", "automaton", "zones"),
         lambda: zones_of(document, file.zones, folder, fastest=fastest),
     )
-    horizon = _horizon(document, file)
+    time_s = None if file.horizon.time_s == "free" else file.horizon.time_s
+    wrong = "max_time_s" if file.horizon.max_time_s is not None else "stay"
+    with at(document, ("horizon",) if time_s is None else ("horizon", wrong)):
+        horizon = made(Horizon, file.horizon, time=time_s)
     vias = []
     for k, part in enumerate(file.via):
         with at(document, ("via", k), about="via"):
@@ -259,10 +264,8 @@ def _names_of(value: Any, own: Model | None) -> dict[str, Any]:
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
     """Exhaustive search is for short words."""
-    from maneuver_automaton.search.words import most_admitted
-
     turned = any(goal.heading == "free" for goal in file.goals)
-    most = most_admitted(free_heading=turned, fixed=file.horizon.time_s != "free")
+    most = words.most_admitted(free_heading=turned, fixed=file.horizon.time_s != "free")
     if file.horizon.max_trims is not None and file.horizon.max_trims > most:
         free = " where a heading is free" if turned else ""
         raise document.error(
@@ -354,13 +357,6 @@ def disturbance_of(part: NoisePart, *, seed: int | None = None) -> simulation.Di
     return made(simulation.Disturbance, part, **known)
 
 
-def _horizon(document: Document, file: ScenarioFile) -> Horizon:
-    part, time_s = file.horizon, file.horizon.time_s
-    wrong = "max_time_s" if part.max_time_s is not None else "stay"
-    with at(document, ("horizon",) if time_s == "free" else ("horizon", wrong)):
-        return made(Horizon, part, time=None if time_s == "free" else time_s)
-
-
 TPCAP = """\
 schema: 1
 name: The car of TPCAP
@@ -440,8 +436,6 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
 
 def own_scenario(statement: Statement, path: Path) -> Scenario:
     """What a format means where no scenario stands beside the file; raises InvalidScenario."""
-    from maneuver_automaton.formats import cl_cbs, tpcap
-
     cars = {tpcap.FORMAT: TPCAP, cl_cbs.FORMAT: CL_CBS}
     if statement.format in cars:
         return scenario_of_text(cars[statement.format], name=statement.format)

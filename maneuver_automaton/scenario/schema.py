@@ -12,7 +12,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge
 from pydantic import (
-    AfterValidator,
     AllowInfNan,
     BeforeValidator,
     Discriminator,
@@ -20,7 +19,6 @@ from pydantic import (
     Strict,
     Tag,
     ValidationInfo,
-    field_validator,
     model_validator,
 )
 
@@ -35,12 +33,15 @@ from maneuver_automaton.scenario.parts import (
     Point,
     Polygon,
     Polygons,
+    Pose2D,
     Positive,
     Several,
     Size,
     Text,
     Truth,
     Whole,
+    exactly,
+    holding,
     need,
     one_or_many,
     optional,
@@ -187,9 +188,7 @@ ViaPose = Annotated[
 GatePoint = Annotated[
     tuple[Number, ...], Several("a point [x, y], two numbers", at_least=2, at_most=3)
 ]
-Gate = Annotated[
-    tuple[GatePoint, GatePoint], Several("a list of two points [x, y]", at_least=2, at_most=2)
-]
+Gate = Annotated[tuple[GatePoint, GatePoint], exactly(2, "a list of two points [x, y]")]
 
 
 class ViaPart(FilePart, title="Via"):
@@ -276,10 +275,7 @@ class GroundPart(FilePart):
     costmap: Name | None = optional("costs of Nav2: 252 costs price, 253 and above are obstacles")
     elevation: Name | None = optional("heights [m]: a metre climbed costs price")
     resolution_m: Positive | None = optional("size of a cell")
-    origin: Annotated[
-        tuple[Number, Number, Number],
-        Several("a pose [x, y, heading], three numbers", at_least=3, at_most=3),
-    ] = Field((0.0, 0.0, 0.0), description="pose of the lower left corner")
+    origin: Pose2D = Field((0.0, 0.0, 0.0), description="pose of the lower left corner")
     price: NotNegative = Field(1.0, description="price, or factor of the raster's values")
     max_cross_slope: NotNegative | None = optional("greatest slope from left to right, rise by way")
     per: Per = Field("metre", description="metre of the way, or second")
@@ -332,21 +328,17 @@ class BoxPart(FilePart, title="Box"):
 
 
 TimedPose = Annotated[
-    tuple[Number, Number, Number, Number],
-    Several("[time, x, y, heading], four numbers", at_least=4, at_most=4),
+    tuple[Number, Number, Number, Number], exactly(4, "[time, x, y, heading], four numbers")
 ]
-
-
-def _in_time(motion: tuple[TimedPose, ...]) -> tuple[TimedPose, ...]:
-    if any(later[0] <= earlier[0] for earlier, later in itertools.pairwise(motion)):
-        raise need("poses [time, x, y, heading] whose times rise")
-    return motion
 
 
 TimedPoses = Annotated[
     tuple[TimedPose, ...],
     Several("a list of at least one [time, x, y, heading]", at_least=1),
-    AfterValidator(_in_time),
+    holding(
+        lambda motion: all(one[0] < after[0] for one, after in itertools.pairwise(motion)),
+        "poses [time, x, y, heading] whose times rise",
+    ),
 ]
 Twists = Annotated[
     tuple[Pose, ...], Several("a list of [v_x, v_y, turn rate], one for every pose but the last")
@@ -415,6 +407,16 @@ class PushPart(FilePart):
     by: Pose = Field(description="[x, y, heading] seen from the vehicle")
 
 
+Pushes = Annotated[
+    tuple[PushPart, ...],
+    Several("a list of pushes"),
+    holding(
+        lambda pushes: len({push.after_step for push in pushes}) == len(pushes),
+        "pushes after different steps",
+    ),
+]
+
+
 class NoisePart(FilePart):
     """What a vehicle does beside its plan."""
 
@@ -426,16 +428,7 @@ class NoisePart(FilePart):
         "standard deviation per step of each speed, angle, ... of a vehicle with inertia"
     )
     twist_scale: Pose | None = optional("true over nominal body velocity, per component")
-    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes")] = Field(
-        (), description="a list of {after_step, by}"
-    )
-
-    @field_validator("pushes")
-    @classmethod
-    def _one_push_a_step(cls, pushes: tuple[PushPart, ...]) -> tuple[PushPart, ...]:
-        if len({push.after_step for push in pushes}) < len(pushes):
-            raise need("pushes after different steps")
-        return pushes
+    pushes: Pushes = Field((), description="a list of {after_step, by}")
 
 
 class LateNoisePart(NoisePart, title="Disturbance"):

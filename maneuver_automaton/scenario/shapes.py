@@ -263,18 +263,15 @@ def _of_file(document: Document, part: GroundPart, where: Where, folder: Path) -
         raise document.error((*where, "max_cross_slope"), "goes with elevation only")
     with at(document, (*where, key), files=True):
         values = _values(path, shades=255.0 if key == "costmap" else 1.0)
-    more: dict[str, Any] = {"price": part.price}
-    if key == "elevation":
-        more["max_cross_slope"] = part.max_cross_slope
-    else:
-        more["per"] = part.per
+    more = {"max_cross_slope": part.max_cross_slope} if key == "elevation" else {"per": part.per}
     make: dict[str, Any] = {
         "raster": Ground.of_raster,
         "costmap": Ground.of_costmap,
         "elevation": Ground.of_elevation,
     }
     with at(document, (*where, key)):
-        found = make[key](values, resolution=part.resolution_m, origin=part.origin, **more)
+        size = {"resolution": part.resolution_m, "origin": part.origin}
+        found = make[key](values, price=part.price, **size, **more)
     ground, walls = found if key == "costmap" else (found, None)
     return GroundFile(ground=ground, part=part, path=path, walls=walls)
 

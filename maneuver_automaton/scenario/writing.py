@@ -15,7 +15,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import relative
 from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Horizon, Problem, Unstated, Via
+from maneuver_automaton.problem import Problem, Unstated, Via
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario, state_keys
@@ -97,7 +97,8 @@ def to_yaml(scenario: Scenario | FleetScenario, *, folder: Path | None = None) -
 
 def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
     """What a file states of one vehicle, key by key; nothing of what is as if left out."""
-    problem = scenario.problem
+    problem, horizon = scenario.problem, scenario.problem.horizon
+    unstated = isinstance(horizon.min_coast, Unstated)
     goals = [
         stated(
             GoalPart,
@@ -121,7 +122,9 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "goal": _one_or_several(goals),
         "cost": _cost(problem.cost)
         | stated_places(problem.place_costs, scenario.ground_files, folder),
-        "horizon": _horizon(problem.horizon),
+        "horizon": stated(
+            HorizonPart, horizon, min_coast_s=None if unstated else horizon.min_coast
+        ),
         "bounds_m": stated(BoundsPart, problem.bounds),
         "margin_m": problem.margin,
         "obstacles": [
@@ -276,11 +279,6 @@ def _cost(cost: StageCost) -> dict[str, Any]:
             "terms(), which returns them"
         )
     return stated(CostPart, terms, norm_order={1.0: 1, 2.0: 2}.get(terms.norm_order, "inf"))
-
-
-def _horizon(horizon: Horizon) -> dict[str, Any]:
-    unstated = isinstance(horizon.min_coast, Unstated)
-    return stated(HorizonPart, horizon, min_coast_s=None if unstated else horizon.min_coast)
 
 
 def _block(key: str, value: Any) -> str:
