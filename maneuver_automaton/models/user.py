@@ -86,6 +86,8 @@ class UserModel:
             )
         for kind, names in (("control", self.control_names), ("reduced", self.reduced_names)):
             limits = getattr(self, f"{kind}_limits")
+            if np.shape(limits) == (2,):
+                limits = np.tile(limits, (len(names), 1))
             limits = limits_of(f"{self.name}: {kind}_limits", limits, names=names)
             object.__setattr__(self, f"{kind}_limits", limits)
 

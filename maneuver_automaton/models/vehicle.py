@@ -152,14 +152,13 @@ UNLIMITED = (-math.inf, math.inf)
 
 
 def limits_of(what: str, limits: ArrayLike, *, names: Sequence[str]) -> Array:
-    """Read-only limits (n, 2), one row for each name, from rows or from one row for all."""
-    array = np.asarray(limits, dtype=np.float64)
-    if array.shape != (2,) and array.shape != (len(names), 2):
+    """Read-only limits (n, 2), one row for each name; infinite where there is no limit."""
+    array = np.array(limits, dtype=np.float64)
+    if array.shape != (len(names), 2):
         raise ValueError(
             f"{what}: got shape {array.shape}, need ({len(names)}, 2): least and greatest "
             f"{', '.join(names) or '(nothing)'}"
         )
-    array = np.broadcast_to(array, (len(names), 2)).copy()
     for name, (low, high) in zip(names, array, strict=True):
         if not low <= high:
             raise ValueError(f"{what}: {name} needs least <= greatest, got ({low:.6g}, {high:.6g})")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -419,15 +419,20 @@ def _tight(model: Model, settings: PolishSettings) -> Array:
 
 def _curved(model: Model) -> list[int]:
     """Numbers of the reduced states whose rates depend on reduced states."""
+    casadi, z, _, rates = _in_symbols(model, model.dynamics)
+    if not len(model.reduced_names):
+        return []
+    return [k for k, bent in enumerate(casadi.which_depends(rates, z, 1, True)) if bent]
+
+
+def _in_symbols(model: Model, of: Callable[[Any, Any], Any]) -> tuple[Any, Any, Any, Any]:
+    """CasADi, reduced state and control, and what is made `of` these, in a column."""
     casadi = load_casadi()
     z = casadi.SX.sym("z", len(model.reduced_names))
     u = casadi.SX.sym("u", len(model.control_names))
     with numpy_on_symbols(casadi):
-        rates = list(model.dynamics(casadi.vertsplit(z), casadi.vertsplit(u)))
-    if not rates:
-        return []
-    depends = casadi.which_depends(casadi.vertcat(*map(casadi.SX, rates)), z, 1, True)
-    return [k for k, bent in enumerate(depends) if bent]
+        made = of(casadi.vertsplit(z), casadi.vertsplit(u))
+    return casadi, z, u, casadi.vertcat(*map(casadi.SX, made))
 
 
 def _problem(
@@ -489,10 +494,5 @@ def _frames(casadi: Any, model: Model, state: Any, control: Any) -> NodeMotion:
 
 def _ends_in_rates(model: Model) -> list[int]:
     """Numbers of the controls that the velocity does not depend on: accelerations and such."""
-    casadi = load_casadi()
-    z = casadi.SX.sym("z", len(model.reduced_names))
-    u = casadi.SX.sym("u", len(model.control_names))
-    with numpy_on_symbols(casadi):
-        velocity = model.velocity(casadi.vertsplit(z), casadi.vertsplit(u))
-    twist = casadi.vertcat(*(casadi.SX(v) for v in velocity))
+    casadi, _, u, twist = _in_symbols(model, model.velocity)
     return [k for k, used in enumerate(casadi.which_depends(twist, u, 1, False)) if not used]

@@ -13,6 +13,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.vehicle import Components
+from maneuver_automaton.models.vehicle import limits_of as checked_limits
 
 Rates = Callable[[Components, Components], Components]
 """``f(x, u)``: the rate of each component of the state."""
@@ -77,8 +78,9 @@ class OptimalControlProblem:
     def __post_init__(self) -> None:
         for name, names in (("state", self.state_names), ("control", self.control_names)):
             object.__setattr__(self, f"{name}_names", tuple(names))
-            limits = _limits(f"{name}_limits", getattr(self, f"{name}_limits"), tuple(names))
-            object.__setattr__(self, f"{name}_limits", limits)
+            if (limits := getattr(self, f"{name}_limits")) is not None:
+                limits = checked_limits(f"optimal control: {name}_limits", limits, names=names)
+                object.__setattr__(self, f"{name}_limits", limits)
         for name in ("start", "end"):
             state = tuple(None if v is None else float(v) for v in getattr(self, name))
             object.__setattr__(self, name, self._inside(name, state))
@@ -173,6 +175,14 @@ class Guess:
         if not (math.isfinite(self.duration) and self.duration > 0.0):
             raise ValueError(f"guess: duration must be positive, got {self.duration} s")
 
+    @classmethod
+    def of_motion(cls, times: Array, *, known: Array, state: Array, control: Array) -> Guess:
+        """The guess at `times` (n,) [s] from a motion at `known` ones (m,), from 0 to its end."""
+        rows = np.stack([np.interp(times, known, column) for column in state.T], axis=1)
+        which = np.searchsorted(known, times[:-1], side="right") - 1
+        held = control[np.clip(which, 0, len(known) - 2)]
+        return cls(state=rows, control=held, duration=float(known[-1]))
+
 
 def straight_guess(problem: OptimalControlProblem) -> Guess:
     """States in a straight line from start to end, free components held, no control.
@@ -205,25 +215,6 @@ def resampled(rows: Array, count: int) -> Array:
 def limits_of(limits: Array | None, count: int) -> Array:
     """Limits (count, 2), infinite if there are none."""
     return np.tile([-np.inf, np.inf], (count, 1)) if limits is None else limits
-
-
-def _limits(what: str, limits: Array | None, names: tuple[str, ...]) -> Array | None:
-    if limits is None:
-        return None
-    array = np.array(limits, dtype=np.float64)  # infinite where there is no limit
-    if array.shape != (len(names), 2):
-        raise ValueError(
-            f"optimal control: {what} has shape {array.shape}, need ({len(names)}, 2): least and "
-            f"greatest {', '.join(names)}"
-        )
-    for name, (low, high) in zip(names, array, strict=True):
-        if not low <= high:
-            raise ValueError(
-                f"optimal control: {what}: {name} needs least <= greatest, "
-                f"got ({low:.6g}, {high:.6g})"
-            )
-    array.setflags(write=False)
-    return array
 
 
 Field = Callable[[Any, Any], Any]

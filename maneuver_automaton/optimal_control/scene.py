@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -271,9 +271,8 @@ class Polished:
             return Guess(state=self.state, control=self.control, duration=self.duration)
         nodes = np.concatenate([[0.0], np.cumsum(self.durations)])
         even = np.linspace(0.0, nodes[-1], len(nodes))
-        state = np.stack([np.interp(even, nodes, column) for column in self.state.T], axis=1)
-        which = np.clip(np.searchsorted(nodes, even[:-1], side="right") - 1, 0, len(nodes) - 2)
-        return Guess(state=state, control=self.control[which], duration=self.duration)
+        guess = Guess.of_motion(even, known=nodes, state=self.state, control=self.control)
+        return replace(guess, duration=self.duration)  # to the last bit
 
 
 class Point(NamedTuple):

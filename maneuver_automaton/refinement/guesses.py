@@ -194,11 +194,8 @@ def course_guess(course: Trajectory) -> Guess:
 
 def guess_at(course: Trajectory, at: Array) -> Guess:
     """Guess from a motion, with nodes at times (n,) [s] since it began."""
-    time = course.time - course.time[0]
-    rows = np.hstack([course.pose, course.reduced_state])
-    state = np.stack([np.interp(at, time, column) for column in rows.T], axis=1)
-    which = np.clip(np.searchsorted(time, at[:-1], side="right") - 1, 0, len(time) - 2)
-    return Guess(state=state, control=course.control[which], duration=float(time[-1]))
+    known, rows = course.time - course.time[0], np.hstack([course.pose, course.reduced_state])
+    return Guess.of_motion(at, known=known, state=rows, control=course.control)
 
 
 def _nodes(run: Timed) -> Array:

@@ -17,6 +17,7 @@ from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost, StageCost, terms_of
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.vehicle import limits_of
 from maneuver_automaton.primitives import Trim
 
 
@@ -274,13 +275,8 @@ def shared_time(lengths: Array, *, least: Array, total: float) -> Array:
 
 def control_box(model: Model, limits: ArrayLike | None, *, asks: str = "retime") -> Array:
     """Least and greatest controls (n_u, 2), around zero; ValueError if they are not."""
-    names = model.control_names
-    box = np.array(model.control_limits if limits is None else limits, dtype=np.float64)
-    if box.shape != (len(names), 2):
-        raise ValueError(
-            f"{asks}: limits have shape {box.shape}, need ({len(names)}, 2): least and greatest "
-            f"{', '.join(names)}"
-        )
+    names, box = model.control_names, model.control_limits if limits is None else limits
+    box = limits_of(f"{asks}: limits", box, names=names)
     for name, (low, high) in zip(names, box, strict=True):
         if not low <= 0.0 <= high:
             raise ValueError(

@@ -245,7 +245,7 @@ def test_without_casadi_it_is_named(monkeypatch):
         ),
         (
             {"control_limits": [0.0, 1.0]},
-            "control_limits has shape (2,), need (1, 2): least and greatest push",
+            "control_limits: got shape (2,), need (1, 2): least and greatest push",
         ),
     ],
 )

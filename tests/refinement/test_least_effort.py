@@ -96,7 +96,7 @@ def test_what_does_not_last_is_left_alone():
         ({"pieces": 1}, "pieces must be at least 2, got 1"),
         ({"cost": Cost(time=1.0)}, r"the terms\(\) of the cost have to be effort, and at most"),
         ({"cost": Cost(effort=1.0, switch=1.0)}, "and at most time beside it"),
-        ({"limits": [[-1.0, 1.0]]}, "limits have shape"),
+        ({"limits": [[-1.0, 1.0]]}, "limits: got shape"),
     ],
 )
 def test_what_it_refuses(options, said):

@@ -234,7 +234,7 @@ def test_costs_and_limits_are_checked():
     assert (
         str(error.value) == "retime: the cost has no effort, need one whose terms() have effort > 0"
     )
-    with pytest.raises(ValueError, match=r"limits have shape \(2,\), need \(2, 2\): least and"):
+    with pytest.raises(ValueError, match=r"limits: got shape \(2,\), need \(2, 2\): least and"):
         retime(plan, Unicycle(), limits=[-1.0, 1.0])
     with pytest.raises(ValueError) as error:
         retime(plan, Unicycle(), limits=[[0.5, 2.0], [-1.0, 1.0]])
