@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -61,7 +62,8 @@ class Automaton(Drawn):
         object.__setattr__(self, "maneuvers", tuple(self.maneuvers))
         if not self.trims:
             raise InvalidAutomaton("automaton: got no trim, need at least one")
-        _check_names(self.trim_names)
+        if twice := [name for name, n in Counter(self.trim_names).items() if n > 1]:
+            raise InvalidAutomaton(f"trim {twice[0]!r}: the name is used twice")
         check_model(self.model)
         object.__setattr__(self, "model", in_world(self.model))
         if self.translated is not None:  # what is along the world's axes gets headings
@@ -319,6 +321,12 @@ class Automaton(Drawn):
         return np.asarray(classes.ravel(), dtype=np.int64)
 
     @cached_property
+    def maneuver_classes(self) -> IntArray:
+        """Classes of trims that each maneuver leaves and reaches (n, 2)."""
+        ends = [(self.index_of(one.source), self.index_of(one.target)) for one in self.maneuvers]
+        return self.trim_classes[np.array(ends, dtype=np.int64).reshape(-1, 2)]
+
+    @cached_property
     def twist_groups(self) -> IntArray:
         """Which trims have equal twists (m,): equal numbers, the first trim's index."""
         order = np.lexsort(self.body_velocities.T[::-1])
@@ -406,14 +414,6 @@ def _check_fit(maneuver: Maneuver, source: Trim, target: Trim) -> None:
 def _frozen(array: Array) -> Array:
     array.setflags(write=False)
     return array
-
-
-def _check_names(names: Iterable[str]) -> None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise InvalidAutomaton(f"trim {name!r}: the name is used twice")
-        seen.add(name)
 
 
 def _checked_control(model: Model, name: str, control: Array) -> Array:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import itertools
 import json
 import math
@@ -16,7 +15,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +23,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._files import journal, journal_lines
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
-from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.automaton.library import hash_of, save_library
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -84,7 +82,7 @@ def build_key(model: Model, objective: ManeuverObjective, settings: TransferSett
     control = rng.uniform(0.1, 0.9, size=(SAMPLES, len(model.control_names)))
     state = _within(model.reduced_limits, state)
     control = _within(model.control_limits, control)
-    return _hash(
+    return hash_of(
         {
             "version": VERSION,
             "group": model.group.__name__,
@@ -101,7 +99,7 @@ def build_key(model: Model, objective: ManeuverObjective, settings: TransferSett
 def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str] = ()) -> str:
     """Hash of all that one maneuver is made from; the names of the trims do not count."""
     ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
-    return _hash([build, *ends, *sorted(keep_sign)])
+    return hash_of([build, *ends, *sorted(keep_sign)])
 
 
 def read_journal(path: Path) -> dict[str, Entry]:
@@ -109,26 +107,17 @@ def read_journal(path: Path) -> dict[str, Entry]:
     entries: dict[str, Entry] = {}
     for line in journal_lines(path):
         with contextlib.suppress(ValueError, TypeError, KeyError):
-            entry = _entry(json.loads(line))
-            entries[entry.key] = entry
+            content = json.loads(line)
+            key, numbers = str(content["key"]), (content["interval"], content["defect"])
+            interval, defect = (math.inf if one is None else float(one) for one in numbers)
+            entries[key] = Entry(
+                key=key,
+                reason=str(content["reason"]),
+                interval=interval,
+                defect=defect,
+                control=np.array(content["control"], dtype=np.float64),
+            )
     return entries
-
-
-def _entry(content: Mapping[str, Any]) -> Entry:
-    defect = content["defect"]
-    interval = content["interval"]
-    return Entry(
-        key=str(content["key"]),
-        reason=str(content["reason"]),
-        interval=math.inf if interval is None else float(interval),
-        defect=math.inf if defect is None else float(defect),
-        control=np.array(content["control"], dtype=np.float64),
-    )
-
-
-def _hash(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _within(limits: Array, shares: Array) -> Array:
@@ -408,7 +397,13 @@ def _assembled(
             failures.append(Failure(source=pair[0], target=pair[1], reason=said))
             continue
         if pair == original:
-            found[pair], defect = _maneuver_of(nodes, pair, entry), entry.defect
+            inputs = Inputs(control=entry.control, interval=entry.interval)
+            course, name = (
+                inputs.drive(nodes.model, nodes[pair[0]].reduced_state),
+                " to ".join(pair),
+            )
+            found[pair] = Maneuver.along(course, name=name, source=pair[0], target=pair[1])
+            defect = entry.defect
         else:
             assert mirror is not None
             found[pair] = mirror.maneuver(found[original], source=pair[0], target=pair[1])
@@ -421,9 +416,3 @@ def _assembled(
                 continue
         defects.append(defect)
     return tuple(found.values()), tuple(failures), defects
-
-
-def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
-    inputs = Inputs(control=entry.control, interval=entry.interval)
-    course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
-    return Maneuver.along(course, name=f"{pair[0]} to {pair[1]}", source=pair[0], target=pair[1])

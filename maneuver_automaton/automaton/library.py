@@ -103,7 +103,7 @@ def automaton_hash(automaton: Automaton) -> str:
 
     Of a maneuver's course the inputs count; its samples follow from them.
     """
-    return _hash(_content(automaton, [None] * len(automaton.maneuvers)))
+    return _hash_of(_content(automaton, [None] * len(automaton.maneuvers)))
 
 
 def save_library(automaton: Automaton, path: Path | str) -> None:
@@ -119,7 +119,7 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
         If the file cannot be written.
     """
     content = _content(automaton, [None] * len(automaton.maneuvers))
-    digest = _hash(content)
+    digest = _hash_of(content)
     states = {trim.name: trim.reduced_state for trim in automaton.trims}
     held = is_reproduced(automaton.model, states, automaton.maneuvers)
     for entry, maneuver, flag in zip(content["maneuvers"], automaton.maneuvers, held, strict=True):
@@ -159,8 +159,6 @@ def load_library(path: Path | str, *, model: Model | None = None) -> Automaton:
     document = _read(path)
     try:
         return _automaton_of(document, model)
-    except InvalidLibrary as error:
-        raise InvalidLibrary(f"{path}: {error}") from error
     except (ValueError, LookupError) as error:
         raise InvalidLibrary(f"{path}: {error}") from error
 
@@ -200,7 +198,7 @@ def _automaton_of(document: Any, own: Model | None) -> Automaton:
     inputs = [one for _, one in stated]
     name = text_of("name", document.get("name", ""))
     automaton = Automaton(model, trims, tuple(maneuver for maneuver, _ in stated), name=name)
-    stated_hash, actual = document.get("hash"), _hash(_content(automaton, inputs))
+    stated_hash, actual = document.get("hash"), _hash_of(_content(automaton, inputs))
     if stated_hash is not None and stated_hash != actual:
         raise InvalidLibrary(
             f"hash: got {stated_hash!r}, but the content has {actual!r}: the file was changed "
@@ -260,10 +258,13 @@ def _content(automaton: Automaton, inputs: Sequence[Inputs | None]) -> dict[str,
     }
 
 
-def _hash(content: Mapping[str, Any]) -> str:
-    text = json.dumps(
-        {"schema": SCHEMA, **content}, sort_keys=True, separators=(",", ":"), allow_nan=False
-    )
+def _hash_of(content: Mapping[str, Any]) -> str:
+    return hash_of({"schema": SCHEMA, **content})
+
+
+def hash_of(content: Any) -> str:
+    """SHA-256, 64 hexadecimal digits, of values as JSON has them."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -40,14 +40,9 @@ def _graphs(automaton: Automaton) -> tuple[Any, Any]:
     """Which classes of trims maneuvers link, along them and against them."""
     from scipy.sparse import csr_array
 
-    classes = automaton.trim_classes
-    n = int(classes.max()) + 1
-    ends = [
-        (classes[automaton.index_of(one.source)], classes[automaton.index_of(one.target)])
-        for one in automaton.maneuvers
-    ]
-    sources, targets = np.array(ends, dtype=np.int64).reshape(-1, 2).T
-    graph = csr_array((np.ones(len(ends), dtype=np.int8), (sources, targets)), shape=(n, n))
+    n = int(automaton.trim_classes.max()) + 1
+    sources, targets = automaton.maneuver_classes.T
+    graph = csr_array((np.ones(len(sources), dtype=np.int8), (sources, targets)), shape=(n, n))
     return graph, graph.T.tocsr()
 
 
@@ -135,18 +130,14 @@ def _reach(
     automaton: Automaton,
 ) -> tuple[tuple[tuple[str, ...], ...], tuple[str, ...], tuple[str, ...]]:
     """Strongly connected components, dead ends, and trims that nothing joins to the others."""
-    classes = automaton.trim_classes
-    n_classes = int(classes.max()) + 1
+    n_classes = int(automaton.trim_classes.max()) + 1
     if n_classes == 1:
         return (automaton.trim_names,), (), ()
     import networkx
 
     graph: networkx.DiGraph[int] = networkx.DiGraph()
     graph.add_nodes_from(range(n_classes))
-    ends = {
-        (int(classes[automaton.index_of(m.source)]), int(classes[automaton.index_of(m.target)]))
-        for m in automaton.maneuvers
-    }
+    ends = set(map(tuple, automaton.maneuver_classes.tolist()))
     graph.add_edges_from((source, target) for source, target in ends if source != target)
     groups = [set(group) for group in networkx.strongly_connected_components(graph)]
     members = [_names_in(automaton, group) for group in groups]

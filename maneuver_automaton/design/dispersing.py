@@ -80,8 +80,7 @@ def disperse_library(
         )
     if metres_per_radian is not None and not 0.0 < metres_per_radian < math.inf:
         raise ValueError(f"disperse: metres_per_radian must be positive, got {metres_per_radian}")
-    ends = [(library.index_of(m.source), library.index_of(m.target)) for m in library.maneuvers]
-    sources, targets = library.trim_classes[np.array(ends)].T
+    sources, targets = library.maneuver_classes.T
     apart = _distances(library, sources, metres_per_radian)
     # The maneuvers of the quickest ways from rest to all trims, and of those back.
     root = int(library.trim_classes[library.rest or 0])

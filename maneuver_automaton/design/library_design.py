@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -157,23 +158,24 @@ def design_library(
         )
     choices = list(best_choices(twists, rates, most=max(most, SIX)))
     points = twists / rates[:, None]
-    disc = None
+    prove = None
     if max_trims is not None:
         choices = [one for one in choices if _circle(points, one) is not None]
-        disc = _disc(points, choices, radius, tasks, least)
+        prove = _proof_of_words(points, choices, max_trims, radius, tasks, least)
     choices = [one for one in choices if len(one.chosen) <= most]
     finite = _better(choices)
     if not finite:
         raise ValueError(
             f"design: no library of at most {most} trims follows all {len(trims)} candidates"
-            + (" by short words, which take straights and full lock" if disc is not None else "")
+            + (" by short words, which take straights and full lock" if prove is not None else "")
             + ", need more trims"
         )
     good = [one for one in finite if one.factor <= within * (1.0 + SAME)]
     best = min(good, key=lambda one: len(one.chosen)) if good else finite[-1]
     words = None
-    if disc is not None and max_trims is not None:
-        words = _short_words(disc, max_trims, tolerance=tolerance, most_boxes=most_boxes)
+    if prove is not None and max_trims is not None:
+        words = prove(tolerance=tolerance, most_boxes=most_boxes)
+        words = replace(words, max_trims=max_trims)
     hardest = int(mixing_factors(twists, rates, best.chosen).argmax())
     chosen = tuple(trims[k] for k in best.chosen)
     return DesignedLibrary(
@@ -197,25 +199,18 @@ def _better(choices: list[Choice]) -> list[Choice]:
     return kept
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Disc:
-    """Goals of short words, and the circles of their shortest paths."""
-
-    turning_radius: float
-    reverse: bool
-    radius: float
-    least: float
-    goals: Array  # (n, 3) that are looked at first
-
-
-def _disc(
+def _proof_of_words(
     points: Array,
     choices: list[Choice],
+    max_trims: int,
     radius: float | None,
     tasks: ArrayLike | None,
     least: float | None,
-) -> _Disc:
-    """Goals that short words are to reach; refuses what has no optimum in closed form."""
+) -> Callable[..., WordsProof]:
+    """What proves the factor of short words; refuses what has no optimum in closed form.
+
+    Source: Dubins (1957), *On curves of minimal length*: without reverse, three trims are enough.
+    """
     circle = _circle(points, choices[0]) if choices else None
     if circle is None:
         raise ValueError(
@@ -232,30 +227,14 @@ def _disc(
     _check_positive("radius", radius, "m")
     least = 0.5 * turning_radius if least is None else least
     _check_positive("least", least, "m")
-    return _Disc(
+    return functools.partial(
+        proven_factor,
         turning_radius=turning_radius,
-        reverse=reverse,
         radius=radius,
+        max_trims=max_trims if reverse else max(max_trims, MOST_TRIMS),
         least=least,
         goals=np.concatenate([posed, poses_in_ball(radius, SAMPLES, seed=SEED)]),
     )
-
-
-def _short_words(disc: _Disc, max_trims: int, *, tolerance: float, most_boxes: int) -> WordsProof:
-    """The factor of words of at most `max_trims` trims.
-
-    Source: Dubins (1957), *On curves of minimal length*: without reverse, three trims are enough.
-    """
-    proof = proven_factor(
-        turning_radius=disc.turning_radius,
-        radius=disc.radius,
-        max_trims=max_trims if disc.reverse else max(max_trims, MOST_TRIMS),
-        least=disc.least,
-        goals=disc.goals,
-        tolerance=tolerance,
-        most_boxes=most_boxes,
-    )
-    return replace(proof, max_trims=max_trims)
 
 
 def _circle(points: Array, choice: Choice) -> tuple[float, bool] | None:

@@ -191,12 +191,11 @@ def _trim_at(
         return MissingTrim(name=name, reason=f"no steady motion: {what}")
     inside = np.clip(everything, *balance.limits.T) + 0.0
     state, control = np.split(inside, [len(model.reduced_names)])
-    exact: Array = np.array(model.body_velocity(state, control))
+    twist: Array = np.array(model.body_velocity(state, control))
     for k, value in balance.twist.items():
-        if abs(exact[k] - value) <= ROUNDING * max(1.0, abs(value)):
-            exact[k] = value
-    exact += 0.0  # -0.0 is 0.0
-    twist = exact
+        if abs(twist[k] - value) <= ROUNDING * max(1.0, abs(value)):
+            twist[k] = value
+    twist += 0.0  # -0.0 is 0.0
     turn_rate = float(np.abs(twist[2:3]).sum()) if "turn_rate" in _twist_names(model) else 0.0
     lateral = float(np.hypot(twist[0], twist[1]) * turn_rate)
     most = math.inf if max_lateral_acceleration is None else max_lateral_acceleration
