@@ -6,13 +6,11 @@ States are drawn, one coordinate after the other is moved, and the worst that ch
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, vector_text
+from maneuver_automaton._arrays import Array, freeze, vector_text
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import Model
 
@@ -147,12 +145,7 @@ class Region:
         room = (limits[limited, 1] - limits[limited, 0]) / 4.0
         states = np.array(whole.states)
         states[dof:][limited] += np.stack([room, -room], axis=-1)
-        region = cls(
-            group=model.group,
-            states=states,
-            controls=whole.controls,
-            reduced_names=model.reduced_names,
-        )
+        region = replace(whole, states=states)
         rng = np.random.default_rng(0)
         drawn = np.array([region.state(rng)[dof:] for _ in range(RATES)])
         controls = np.array([region.control(rng) for _ in range(RATES)])
@@ -196,15 +189,10 @@ def _finite(limits: Array) -> Array:
 Draw = Callable[[np.random.Generator], tuple[Array, Array]]
 """Draws a state and a control."""
 
+Defect = Callable[[LieGroup, Array, Array], tuple[Array, float]]
+"""What changes at a state, under a control, when it is moved: (n,), and what is greatest there."""
+
 NOWHERE = np.zeros(0)
-
-
-class Defect(Protocol):
-    """What changes at a state when it is moved: (n,), and the greatest value met there."""
-
-    def __call__(self, by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
-        """That change."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -311,8 +299,3 @@ def _complaint(
         f"by {abs(worst.defect[first]):.4g}{question.units(first)} {where}, moved by "
         f"{vector_text(worst.by.pose)}{still}; {question.cause(broken, violated)}"
     )
-
-
-def values_of(name: str, value: ArrayLike) -> Array:
-    """Numbers in a row (n,), from a row or from one number."""
-    return np.atleast_1d(as_array(name, value))

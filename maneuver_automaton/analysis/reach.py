@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +73,7 @@ def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSe
         raise ValueError(f"reach: {automaton.model.name} is no vehicle in the plane")
     index = automaton.rest if start is None else automaton.index_of(start)
     first = int(automaton.trim_classes[index or 0])
-    steps = _steps(automaton, settings)
-    return _searched(first, steps, settings)
+    return _searched(first, _steps(automaton, settings), settings)
 
 
 def rest_classes(automaton: Automaton) -> frozenset[int]:
@@ -92,11 +92,9 @@ def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Nodes]:
             seconds = min(settings.edge_cost / rate, trim.max_duration)
             there = SE2.exp(seconds * trim.body_velocity).pose
             rows[where].append((there, settings.edge_cost, where))
-    for maneuver in automaton.maneuvers:
-        source, target = (
-            int(automaton.trim_classes[automaton.index_of(name)])
-            for name in (maneuver.source, maneuver.target)
-        )
+    for maneuver, (source, target) in zip(
+        automaton.maneuvers, automaton.maneuver_classes.tolist(), strict=True
+    ):
         cost = maneuver.duration if settings.measure == "time" else path_length(maneuver)
         if maneuver.displacement.any() or source != target:
             rows[source].append((maneuver.displacement, cost, target))
@@ -117,7 +115,7 @@ def _searched(first: int, steps: dict[int, _Nodes], settings: ReachSettings) -> 
     while open_.costs.size:
         limit = float(open_.costs.min()) + max(least, SHORTEST * settings.most)
         due = open_.costs < limit
-        wave, open_ = _cheapest(open_.chosen(due), settings), open_.chosen(~due)
+        wave, open_ = _cheapest([open_.chosen(due)], settings), open_.chosen(~due)
         fresh = _unknown(wave, known, settings)
         if not fresh.costs.size:
             continue
@@ -125,16 +123,13 @@ def _searched(first: int, steps: dict[int, _Nodes], settings: ReachSettings) -> 
         if len(known) >= settings.most_nodes:
             complete = False
             break
-        parts = [open_, *_followers(fresh, steps, settings)]
-        open_ = _cheapest(_concatenated(parts), settings)
-    nodes = _cheapest(_concatenated(closed), settings)
-    order = np.argsort(nodes.costs, kind="stable")
-    nodes = nodes.chosen(order)
-    return Reached(poses=nodes.poses, costs=nodes.costs, classes=nodes.classes, complete=complete)
+        open_ = _cheapest([open_, *_followers(fresh, steps, settings)], settings)
+    nodes = _cheapest(closed, settings)
+    nodes = nodes.chosen(np.argsort(nodes.costs, kind="stable"))
+    return Reached(**nodes._asdict(), complete=complete)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Nodes:
+class _Nodes(NamedTuple):
     poses: Array
     costs: Array
     classes: IntArray
@@ -152,16 +147,9 @@ class _Nodes:
         return keys
 
 
-def _concatenated(parts: Sequence[_Nodes]) -> _Nodes:
-    return _Nodes(
-        np.concatenate([part.poses for part in parts]),
-        np.concatenate([part.costs for part in parts]),
-        np.concatenate([part.classes for part in parts]),
-    )
-
-
-def _cheapest(nodes: _Nodes, settings: ReachSettings) -> _Nodes:
-    """One node for each cell and class."""
+def _cheapest(parts: Sequence[_Nodes], settings: ReachSettings) -> _Nodes:
+    """Of all the nodes one for each cell and class."""
+    nodes = _Nodes(*map(np.concatenate, zip(*parts, strict=True)))
     order = np.argsort(nodes.costs, kind="stable")
     _, firsts = np.unique(nodes.keys(settings)[order], return_index=True)
     return nodes.chosen(order[firsts])

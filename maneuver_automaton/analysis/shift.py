@@ -17,7 +17,7 @@ from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import moved_rates, moved_state
 
 StateControlFunction = Callable[[Array, Array], ArrayLike]
-"""A function of one state (n_x,), pose first, and one control (n_u,)."""
+"""A function of one state (n_x,), pose first, and one control (n_u,): one or more numbers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -45,10 +45,8 @@ class QuadraticCost:
         for kind in ("state", "control"):
             freeze(self, f"{kind}_reference")
             freeze(self, f"{kind}_weight")
-            n, shape = (
-                getattr(self, f"{kind}_reference").size,
-                getattr(self, f"{kind}_weight").shape,
-            )
+            n = getattr(self, f"{kind}_reference").size
+            shape = getattr(self, f"{kind}_weight").shape
             if shape != (n, n):
                 raise ValueError(
                     f"quadratic cost: {kind}_weight has shape {shape}, need ({n}, {n}) as "

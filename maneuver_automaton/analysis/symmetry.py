@@ -17,8 +17,8 @@ from maneuver_automaton.analysis.examine import (
     SymmetryReport,
     examine,
     unit_of,
-    values_of,
 )
+from maneuver_automaton.analysis.shift import StateControlFunction
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import (
     Model,
@@ -207,9 +207,6 @@ def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], st
     return cause
 
 
-StateControlFunction = Callable[[Array, Array], ArrayLike]
-"""``l(x, u)`` or ``g(x, u)`` of one state (n_x,) and one control (n_u,): one or more numbers."""
-
 BoundaryFunction = Callable[[Array, Array], ArrayLike]
 """``r(x_0, x_T)`` of the first and the last state (n_x,): one or more numbers."""
 
@@ -326,9 +323,9 @@ def _check(
     said = "r(x_0, x_T)" if draw else what
 
     def defect(by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
-        here = values_of(said, function(state, control))
-        change = values_of(said, function(moved_state(by, state), control)) - here
-        return change, float(np.abs(here).max(initial=0.0))
+        both = (function(one, control) for one in (state, moved_state(by, state)))
+        here, there = (np.atleast_1d(as_array(said, value)) for value in both)
+        return there - here, float(np.abs(here).max(initial=0.0))
 
     def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
         place = any(motion.startswith(("translation", "climb")) for motion in broken)

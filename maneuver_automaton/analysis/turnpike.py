@@ -187,11 +187,9 @@ def _optimum(
         control_limits=model.control_limits,
     )
     n_nodes = 1 + math.ceil(duration / step)
-    at = np.linspace(0.0, duration, n_nodes)
     rows = np.concatenate([word.pose, word.reduced_state], axis=1)
-    state = np.stack([np.interp(at, word.time, column) for column in rows.T], axis=-1)
-    control = word.control[np.searchsorted(word.time, at[:-1], side="right") - 1]
-    guess = Guess(state=state, control=control, duration=duration)
+    at = np.linspace(0.0, duration, n_nodes)
+    guess = Guess.of_motion(at, known=word.time, state=rows, control=word.control)
     return solve(problem, TimeGrid(n_nodes=n_nodes, rule="rk4"), guess=guess, settings=settings)
 
 
