@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
-from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
@@ -33,8 +32,8 @@ from maneuver_automaton.roads.plans import (
     polished_controls,
 )
 from maneuver_automaton.roads.route import Route, hindrance, route_of
-from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
-from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
+from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules, nearest_to
+from maneuver_automaton.roads.scene import RoadScene, moved_obstacle
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
     clearing_of,
@@ -270,18 +269,8 @@ class RoadPlanner:
             start_time=self.time_of(plan.tick + n),
         )
         off = self.settings.off_traffic_m
-        return all(
-            closest_to(
-                stands,
-                self.vehicle.model,
-                (one,),
-                footprint=(self.vehicle.footprint,),
-                within=presence_of(one),
-                enough=off,
-            ).distance
-            > off
-            for one in self.kind
-        )
+        least = (nearest_to(stands, self.vehicle, one, enough=off) for one in self.kind)
+        return all(one.distance > off for one in least)
 
     def polished(self, plan: RoadDecision, *, passes: int = ROUND, rounds: int = 1) -> RoadDecision:
         """A plan to a goal made cheaper by `polished_controls`; any other as it is."""

@@ -65,7 +65,11 @@ def route_of(scene: RoadScene) -> Route:
     limit = _limits_around(scene.lanelets, points, heading, own)
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
-    extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
+    extents = np.full((len(scene.goals), 4), [-np.inf, np.inf, -np.inf, np.inf])
+    for extent, goal in zip(extents, scene.goals, strict=True):
+        if goal.places is not None:
+            extent[:] = _extent(outlines_of(goal.places), points[here:], heading[here:])
+            extent += [SPACING * here, SPACING * here, 0.0, 0.0]
     return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, extents=extents)
 
 
@@ -258,14 +262,6 @@ def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, o
     for k in range(len(limit) - 2, -1, -1):  # so fast that braking keeps the limits ahead
         limit[k] = np.minimum(limit[k], np.sqrt(limit[k + 1] ** 2 + 2.0 * BRAKING * SPACING))
     return limit
-
-
-def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
-    """Stations and offsets between which a goal lies; all of them if it is no place."""
-    if goal.places is None:
-        return np.array([-np.inf, np.inf, -np.inf, np.inf])
-    extent = _extent(outlines_of(goal.places), points[here:], heading[here:])
-    return np.asarray(extent + np.array([SPACING * here, SPACING * here, 0.0, 0.0]))
 
 
 def extent_on(rings: Sequence[Array], route: Route) -> Array:

@@ -20,6 +20,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import RECENT
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
+from maneuver_automaton.audit.clearance import Least
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.collision.blocked import too_close
@@ -216,8 +217,7 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
     model, body = vehicle.model, (vehicle.footprint,)
     clearance, hit = math.inf, set()
     for one in scene.traffic:
-        # A road user counts only while it is there, so each is measured within its own times.
-        distance = closest_to(plan, model, (one,), footprint=body, within=presence_of(one)).distance
+        distance = nearest_to(plan, vehicle, one).distance
         clearance = min(clearance, distance)
         if distance <= too_close(0.0):
             hit.add(one.name)
@@ -230,6 +230,12 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
         clearance_m=clearance,
         edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
     )
+
+
+def nearest_to(plan: Plan, vehicle: RoadVehicle, one: Obstacle, *, enough: float = 0.0) -> Least:
+    """The least clearance of a plan to a road user, which counts only while it is there."""
+    body, there = (vehicle.footprint,), presence_of(one)
+    return closest_to(plan, vehicle.model, (one,), footprint=body, within=there, enough=enough)
 
 
 def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]:

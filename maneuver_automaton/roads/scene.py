@@ -99,12 +99,9 @@ class RoadScene:
 
     def present(self, time: float) -> list[Obstacle]:
         """Obstacles that are on the road at `time` [s]."""
-        times = [presence_of(one) for one in self.traffic]
-        return [
-            one
-            for one, (first, last) in zip(self.traffic, times, strict=True)
-            if first - TIME_TOLERANCE <= time <= last + TIME_TOLERANCE
-        ]
+        there = [(one, *presence_of(one)) for one in self.traffic]
+        most = TIME_TOLERANCE
+        return [one for one, first, last in there if first - most <= time <= last + most]
 
     def moved(self, by: SE2, *, digits: int | None = None) -> RoadScene:
         """The scene moved by a planar pose; its numbers rounded to `digits` if given.

@@ -22,7 +22,6 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
 from maneuver_automaton._interrupts import patient, stopped
-from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.collision.blocked import too_close
@@ -30,8 +29,8 @@ from maneuver_automaton.fleet.result import Closest
 from maneuver_automaton.roads.driving import Driver, RoadDrive, RoadPlanResult, plan_road
 from maneuver_automaton.roads.planner import LONGEST_STOP, road_planner
 from maneuver_automaton.roads.plans import RoadSettings
-from maneuver_automaton.roads.rules import RoadVerdict, judged
-from maneuver_automaton.roads.scene import TIME_TOLERANCE, RoadScene, presence_of
+from maneuver_automaton.roads.rules import RoadVerdict, judged, nearest_to
+from maneuver_automaton.roads.scene import TIME_TOLERANCE, RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 SAMPLE_S = 0.05  # between places of a plan, as others see it while they are planned
@@ -112,17 +111,16 @@ def plan_roads(
     if not scenes:
         raise ValueError("road fleet: there is no vehicle, need at least one")
     vehicle, begin = vehicle or RoadVehicle(), time.perf_counter()
-    order, best = list(scenes), dict[str, RoadPlanResult]()
+    order, best, most = list(scenes), dict[str, RoadPlanResult](), -1
     tried: set[tuple[str, ...]] = set()
-    last = tuple(order)
     while tuple(order) not in tried:
         tried.add(tuple(order))
         left = time_limit - (time.perf_counter() - begin)
         found = _in_order(scenes, vehicle, order, max(left, 0.0))
-        if _count(found) > _count(best) or not best:
-            best, last = found, tuple(order)
-        over = stopped() or time.perf_counter() - begin > time_limit
         failed = [one for one in order if found[one].plan is None]
+        if len(order) - len(failed) > most:
+            best, last, most = found, tuple(order), len(order) - len(failed)
+        over = stopped() or time.perf_counter() - begin > time_limit
         if not failed or over:
             break
         order = [*failed, *(one for one in order if one not in failed)]
@@ -134,10 +132,6 @@ def plan_roads(
         order=last,
         search_s=time.perf_counter() - begin,
     )
-
-
-def _count(results: Mapping[str, RoadPlanResult]) -> int:
-    return sum(one.plan is not None for one in results.values())
 
 
 def _in_order(
@@ -200,15 +194,7 @@ def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[Clos
     rows, named = [], [*plans.items()]
     for k, (name, plan) in enumerate(named):
         for other, its in named[k + 1 :]:
-            body = driving(vehicle, its, other)
-            least = closest_to(
-                plan,
-                vehicle.model,
-                (body,),
-                footprint=(vehicle.footprint,),
-                within=presence_of(body),
-                enough=too_close(0.0),
-            )
+            least = nearest_to(plan, vehicle, driving(vehicle, its, other), enough=too_close(0.0))
             if math.isfinite(least.distance):
                 rows.append(Closest((name, other), least.time, float(least.distance)))
     return tuple(sorted(rows, key=lambda row: row.distance_m))
