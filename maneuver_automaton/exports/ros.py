@@ -17,7 +17,7 @@ from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.table import accelerations, component, twist_rates
-from maneuver_automaton.groups import SE2
+from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
 from maneuver_automaton.words.library import four_columns
@@ -201,8 +201,9 @@ def _trajectory(
 ) -> Message:
     """Transforms, velocities and accelerations of all frames, seen from the world."""
     transforms = [_transforms(poses) for _, poses in frames]
-    velocity = _in_world(rows.pose, rows.twist)
-    acceleration = _rates(rows.time, velocity) if felt is None else _in_world(rows.pose, felt)
+    turned = group_of(rows.pose.shape[1])(rows.pose).pose_rates  # from the body to the world
+    velocity = turned(rows.twist)
+    acceleration = _rates(rows.time, velocity) if felt is None else turned(felt)
     carried = [_rates(rows.time, poses) for _, poses in frames[1:]]
     velocities = list(map(_twists, (velocity, *carried)))
     changes = (acceleration, *(_rates(rows.time, one) for one in carried))
@@ -268,15 +269,6 @@ def _carried(mover: Mover, rows: PlanArrays) -> list[tuple[str, Array]]:
         (name, np.concatenate([(vehicle @ SE2(seen[:, k, :3])).pose, rows.pose[:, 3:]], axis=1))
         for k, name in enumerate(model.part_names)
     ]
-
-
-def _in_world(pose: Array, twist: Array) -> Array:
-    """Twists (n, dof) of the body frame, turned into that of the world."""
-    turned = twist.copy()
-    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    turned[:, 0] = cos * twist[:, 0] - sin * twist[:, 1]
-    turned[:, 1] = sin * twist[:, 0] + cos * twist[:, 1]
-    return turned
 
 
 def _rates(time: Array, pose: Array) -> Array:

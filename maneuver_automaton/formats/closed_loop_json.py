@@ -23,6 +23,7 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
+    BrokenEntry,
     DocumentHead,
     ModelEntry,
     document_of,
@@ -65,14 +66,6 @@ from maneuver_automaton.receding_horizon import (
 MOST_STEPS = 1_000_000
 FINEST_M, FINEST_RAD = 0.05, 0.05  # between samples of what was driven
 NOTHING = "nothing"  # the name of a step in which nothing was applied
-
-
-class BrokenEntry(TypedDict):
-    """A guarantee that did not hold, and why."""
-
-    step: NotRequired[Annotated[Whole | None, says("its number, where it is not that of the row")]]
-    guarantee: str
-    reason: str
 
 
 VehiclePose = Annotated[Numbers, says("where it was, if pose is where it will be")]

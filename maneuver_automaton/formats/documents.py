@@ -57,6 +57,14 @@ class ModelEntry(TypedDict):
     control: list[str]
 
 
+class BrokenEntry(TypedDict):
+    """A guarantee that did not hold, and why."""
+
+    step: NotRequired[Annotated[Whole | None, says("its number, where it is not that of the row")]]
+    guarantee: str
+    reason: str
+
+
 class ClosestEntry(TypedDict):
     """Two vehicles, and where they are nearest to each other."""
 

@@ -16,6 +16,7 @@ from typing_extensions import TypedDict
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.formats.documents import (
     FLEET,
+    BrokenEntry,
     ClearanceEntry,
     ClosestEntry,
     DocumentHead,
@@ -65,14 +66,6 @@ class RoadPlanDocument(PlanDocument):
     stop: Annotated[list[PrimitiveEntry], says("how it stops where it cannot go on")]
 
 
-class DriveBrokenEntry(TypedDict):
-    """What a drive did that it must not."""
-
-    step: Whole | None
-    guarantee: str
-    reason: str
-
-
 class DriveStepEntry(TypedDict):
     """A step of a drive; in the last entry, where it ended, the plan is null."""
 
@@ -107,7 +100,7 @@ class DriveDocument(DocumentHead):
     audit: NotRequired[RoadAuditEntry]
     min_clearance_m: NotRequired[Known]
     collisions: NotRequired[Whole]
-    broken_guarantees: NotRequired[list[DriveBrokenEntry]]
+    broken_guarantees: NotRequired[list[BrokenEntry]]
     steps: Annotated[list[DriveStepEntry], Field(min_length=1)]
 
 
