@@ -96,12 +96,6 @@ def build_key(model: Model, objective: ManeuverObjective, settings: TransferSett
     )
 
 
-def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str] = ()) -> str:
-    """Hash of all that one maneuver is made from; the names of the trims do not count."""
-    ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
-    return hash_of([build, *ends, *sorted(keep_sign)])
-
-
 def read_journal(path: Path) -> dict[str, Entry]:
     """Entries by key; a line that a killed build left unfinished does not count."""
     entries: dict[str, Entry] = {}
@@ -331,9 +325,10 @@ class _Recipe:
     keep_sign: tuple[str, ...] = field(compare=False)
 
     def key_of(self, pair: Pair) -> str:
-        return pair_key(
-            self.key, self.nodes[pair[0]], self.nodes[pair[1]], keep_sign=self.keep_sign
-        )
+        """Hash of all that one maneuver is made from; the names of the trims do not count."""
+        trims = (self.nodes[name] for name in pair)
+        ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in trims]
+        return hash_of([self.key, *ends, *sorted(self.keep_sign)])
 
 
 @functools.lru_cache(maxsize=1)

@@ -183,8 +183,6 @@ WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a li
 
 
 NEEDED = ("name", "source", "target", "displacement", "duration")
-
-
 KNOWN = (*NEEDED, "control", "until", "samples", "cost_multiplier", "comment")
 
 
