@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -164,23 +163,16 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     least[: task.first] = longest[: task.first] = plan.durations[: task.first]
     begin = np.clip(plan.durations, least, longest)
     rows = _independent(task.exact(begin)[1][:, task.first :])
-    conditions: list[Any] = []
-    if rows.size:
-        conditions.append(
-            {
-                "type": "eq",
-                "fun": lambda t: settled(task.exact(t)[0][rows]),
-                "jac": lambda t: settled(task.exact(t)[1][rows]),
-            }
-        )
-    if task.room(begin)[0].size:
-        conditions.append(
-            {
-                "type": "ineq",
-                "fun": lambda t: settled(task.room(t)[0]),
-                "jac": lambda t: settled(task.room(t)[1]),
-            }
-        )
+    asked = [("eq", task.exact, rows), ("ineq", task.room, np.arange(len(task.room(begin)[0])))]
+    conditions = [
+        {
+            "type": kind,
+            "fun": lambda t, of=of, kept=kept: settled(of(t)[0][kept]),
+            "jac": lambda t, of=of, kept=kept: settled(of(t)[1][kept]),
+        }
+        for kind, of, kept in asked
+        if kept.size
+    ]
 
     costs = task.problem.bound_place_costs
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
