@@ -85,11 +85,9 @@ class UserModel:
                 "dynamics, need a function of (reduced_state, control)"
             )
         for kind, names in (("control", self.control_names), ("reduced", self.reduced_names)):
-            limits = getattr(self, f"{kind}_limits")
-            if np.shape(limits) == (2,):
-                limits = np.tile(limits, (len(names), 1))
-            limits = limits_of(f"{self.name}: {kind}_limits", limits, names=names)
-            object.__setattr__(self, f"{kind}_limits", limits)
+            what, limits = f"{kind}_limits", getattr(self, f"{kind}_limits")
+            rows = np.tile(limits, (len(names), 1)) if np.shape(limits) == (2,) else limits
+            object.__setattr__(self, what, limits_of(f"{self.name}: {what}", rows, names=names))
 
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
         """Twist (..., dof) in the body frame, in the order of the pose."""
