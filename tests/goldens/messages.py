@@ -236,7 +236,8 @@ def folder() -> Iterator[Path]:
             Path("loop.yaml").write_text(LOOP)
             Path("none.yaml").write_text(SCENARIO + "bounds_m: {x: [-0.5, 0.5]}\n")
             fleet = FLEET.replace("time_limit_s: 1", "time_limit_s: 20")  # it ends before
-            Path("fleet.yaml").write_text(fleet + "receding_horizon: {step_s: 0.5}\n")
+            loop = "receding_horizon: {step_s: 0.5, time_limit_s: 20}\n"
+            Path("fleet.yaml").write_text(fleet + loop)
             Path("still.yaml").write_text(fleet)
             Path("road.xml").write_text(ALONE)
             Path("two.xml").write_text(TOGETHER)
