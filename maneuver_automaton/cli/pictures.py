@@ -153,11 +153,10 @@ def _serve(read: int) -> None:
     """Load what draws, wait for an order, carry it out and end; who asked does what fails."""
     code = 1
     try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        nowhere = os.open(os.devnull, os.O_RDWR)
+        for one in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(one, signal.SIG_DFL)
         for stream in (0, 1, 2):
-            os.dup2(nowhere, stream)
+            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
         _ = ready_to_draw().figure_of
         from maneuver_automaton.plotting.pages import prepare
 
@@ -165,6 +164,7 @@ def _serve(read: int) -> None:
         with os.fdopen(read, "rb") as pipe:
             order = pipe.read()
         if order:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is begun is drawn
             draw, args = pickle.loads(order)
             draw(*args)
             code = 0
