@@ -13,7 +13,6 @@ from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.automaton.validation import AutomatonReport, validate
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import (
-    LookOptions,
     automaton_of,
     make_folder,
     named_automaton,
@@ -21,7 +20,7 @@ from maneuver_automaton.cli.inputs import (
     target,
     writing,
 )
-from maneuver_automaton.cli.pictures import ready_to_draw
+from maneuver_automaton.cli.pictures import LookOptions, ready_to_draw
 from maneuver_automaton.cli.terminal import Advance, console, counted, progress_bar, table, waiting
 from maneuver_automaton.design import DesignedLibrary, disperse_library
 from maneuver_automaton.errors import InvalidScenario

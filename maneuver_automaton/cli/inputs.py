@@ -19,12 +19,12 @@ from maneuver_automaton import exports
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.cli.guard import complain
+from maneuver_automaton.cli.pictures import LookOptions
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 from maneuver_automaton.formats import commonroad, libraries
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.models.model import check_model
-from maneuver_automaton.plotting.look import Look, size_of
 from maneuver_automaton.scenario import RoadScenario, Scenario, fleet, load_scenario, remarks_on
 
 OF_LOOPS = re.compile(r"^(receding horizon: |fleet horizon: |fleet: )+")  # a file says it better
@@ -225,30 +225,6 @@ def _wrong(said: str) -> InvalidScenario:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LookOptions:
-    """What the command line says of pictures."""
-
-    title: str | None = None  # None: the name of the scenario, and none in a paper
-    size: str | None = None  # WIDTH or WIDTHxHEIGHT [in]
-    style: str = "screen"
-
-    def __post_init__(self) -> None:
-        if self.size is not None or self.style != "screen":
-            self.look()  # Matplotlib is needed anyway, and a wrong size is told before planning
-
-    def look(self, name: str = "") -> Look:
-        """The look of a picture of the scenario `name`; raises InvalidScenario."""
-        title = self.title if self.title is not None else name
-        if self.title is None and self.style == "paper":
-            title = ""  # the caption has it
-        try:
-            size = None if self.size is None else size_of(self.size)
-            return Look(title=title, size=size, style=self.style)
-        except ValueError as error:
-            raise InvalidScenario(f"--{error}") from error
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Budgets:
     """How long, how well and how often is searched."""
 
@@ -273,9 +249,6 @@ class Options:
     """Options of `plan` and `mpc`, the same for every file of a folder."""
 
     budgets: Budgets = field(default_factory=Budgets)
-    plot: bool = True
-    animate: bool = False
-    html: bool = False
     look: LookOptions = field(default_factory=LookOptions)
     quiet: bool = False
     leave: bool = False  # a start in contact is left first

@@ -24,7 +24,7 @@ from maneuver_automaton.cli.inputs import (
     states_several,
     writing,
 )
-from maneuver_automaton.cli.pictures import draughtsman, draw
+from maneuver_automaton.cli.pictures import Draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import write_document
@@ -101,7 +101,7 @@ class Job:
     options: Options
 
     def done(self, out: Path) -> JobResult:
-        """Do it, and write its document into the folder `out`; no picture."""
+        """Do it, for a folder `out`, where nothing of an earlier one is left but its document."""
         kind, scenario = self._read()
         refuse_unknown(self.path, self.command, kind, self.options, self.parts)
         if kind == "fleet":
@@ -112,6 +112,13 @@ class Job:
         with announced(quiet=self.options.quiet):
             outcome: JobResult = work(self, scenario)
         with writing(out):
+            for name in PICTURES[self.command] if outcome.result is not None else ():
+                (out / name).unlink(missing_ok=True)
+        return outcome
+
+    def write(self, outcome: JobResult, out: Path) -> None:
+        """Write its document."""
+        with writing(out):
             file = out / f"{outcome.file or DOCUMENTS[self.command]}.json"
             source = {"file": self.path, "with": self.parts.beside, "case": self.parts.case}
             write_document(
@@ -120,9 +127,6 @@ class Job:
                 source=source if "vehicles" in outcome.document else None,
                 interrupted=stopped(),
             )
-            for name in PICTURES[self.command] if outcome.result is not None else ():
-                (out / name).unlink(missing_ok=True)  # of an earlier one
-        return outcome
 
     def _read(self) -> tuple[str, Any]:
         if is_road(self.path):
@@ -137,11 +141,18 @@ class Job:
 
     def drawn(self, outcome: JobResult, out: Path) -> None:
         """Write the pictures that were asked for, in this process."""
-        options = self.options
-        wanted = options.plot or options.animate or options.html
+        look = self.options.look
+        wanted = look.plot or look.animate or look.html
         if wanted and outcome.result is not None and not stopped():
             with writing(out):
-                draw(outcome.result, outcome.name, out / DOCUMENTS[self.command], options)
+                draw(*self.order(outcome, out))
+
+    def order(self, outcome: JobResult, out: Path) -> tuple[Any, ...]:
+        """What `draw` is asked for."""
+        result, look = outcome.result, self.options.look
+        if not (progress := self.options.budgets.gap is not None):
+            result = recording_of(result)  # which is read without all that plans
+        return result, outcome.name, out / DOCUMENTS[self.command], look, progress
 
 
 def plan(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool) -> int:
@@ -163,32 +174,28 @@ def mpc(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool)
 
 
 def _run(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:
+    one = Draughtsman.at_hand
+    if one is not None and (path.is_dir() or is_road(path)):
+        one.dismiss()
+        one = None
     if path.is_dir():
         return _run_folder(command, path, out, options, parts)
-    return _run_file(Job(command=command, path=path, parts=parts, options=options), out)
-
-
-def _run_file(job: Job, out: Path) -> int:
-    beside = job.command == "plan" and job.options.plot and not is_road(job.path)
-    with draughtsman(wanted=beside) as one:
-        outcome = job.done(out)
-        shown = outcome.result
-        if shown is not None and job.options.budgets.gap is None:
-            shown = recording_of(shown)  # which is read without all that plans
-        order = (draw, shown, outcome.name, out / "plan", job.options)
-        begun = one is not None and not stopped() and one.begin(*order)
-        if not begun:
+    job = Job(command=command, path=path, parts=parts, options=options)
+    outcome = job.done(out)
+    begun = one is not None and not stopped() and one.begin(draw, *job.order(outcome, out))
+    job.write(outcome, out)
+    if not begun:
+        job.drawn(outcome, out)
+    try:
+        if not options.quiet:
+            outcome.tell(str(out))
+        for line in outcome.complaints:
+            complain(f"{path}: {line}")
+        if command == "plan" and outcome.done and stopped():
+            complain(f"{path}: interrupted: the best plan so far is in {out / 'plan.json'}")
+    finally:
+        if begun and one is not None and not one.is_done():
             job.drawn(outcome, out)
-        try:
-            if not job.options.quiet:
-                outcome.tell(str(out))
-            for line in outcome.complaints:
-                complain(f"{job.path}: {line}")
-            if job.command == "plan" and outcome.done and stopped():
-                complain(f"{job.path}: interrupted: the best plan so far is in {out / 'plan.json'}")
-        finally:
-            if begun and one is not None and not one.is_done():
-                job.drawn(outcome, out)
     return FOUND if outcome.done else NO_PLAN
 
 
@@ -243,6 +250,7 @@ def _row(
         with contextlib.chdir(folder):
             job = Job(command=command, path=path, parts=parts, options=options)
             outcome = job.done(out)
+            job.write(outcome, out)
             job.drawn(outcome, out)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         reason = explained(error)

@@ -8,45 +8,73 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+from maneuver_automaton import plotting
+from maneuver_automaton import recording as recordings
 from maneuver_automaton._interrupts import is_main_program
-from maneuver_automaton.cli.inputs import Options
-from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.recording import Recording, recording_of
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.plotting.look import Look, size_of
 
 
-def draw(result: Any, name: str, file: Path, options: Options) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LookOptions:
+    """What the command line says of pictures."""
+
+    title: str | None = None  # None: the name of the scenario, and none in a paper
+    size: str | None = None  # WIDTH or WIDTHxHEIGHT [in]
+    style: str = "screen"
+    plot: bool = True
+    animate: bool = False
+    html: bool = False
+
+    def __post_init__(self) -> None:
+        if self.size is not None or self.style != "screen":
+            self.look()  # Matplotlib is needed anyway, and a wrong size is told before planning
+
+    def look(self, name: str = "") -> Look:
+        """The look of a picture of the scenario `name`; raises InvalidScenario."""
+        title = self.title if self.title is not None else name
+        if self.title is None and self.style == "paper":
+            title = ""  # the caption has it
+        try:
+            size = None if self.size is None else size_of(self.size)
+            return Look(title=title, size=size, style=self.style)
+        except ValueError as error:
+            raise InvalidScenario(f"--{error}") from error
+
+
+def draw(result: Any, name: str, file: Path, asked: LookOptions, progress: bool) -> None:
     """Write the pictures of a result that were asked for: `file` with their endings."""
-    recording, plotting = recording_of(result), ready_to_draw()
+    recording, look, plotting = recordings.recording_of(result), asked.look(name), ready_to_draw()
     moves, on_roads = not why_no_film(recording), bool(recording.world.lanes)
-    if options.plot and (moves or not on_roads):
-        look = options.look.look(name)
+    if asked.plot and (moves or not on_roads):
         plotting.save_picture(recording, file.with_suffix(".png"), look=look)
         is_plan = recording.kind == "plan"
         if is_plan and plotting.flies_among_heights(recording):
             plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
-        if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
+        if is_plan and progress and recording.movers[0].has_plan:
             plotting.save_progress_figure(result, file.with_name("progress.png"), title=look.title)
         if recording.alternatives:
             path = file.with_name("alternatives.png")
             plotting.save_picture(recording, path, look=look, view="alternatives")
-    if options.animate and moves:
-        save_film(recording, file.with_suffix(".gif"), options.look.look(name))
-    page = options.html or (options.animate and file.name == "closed_loop")
+    if asked.animate and moves:
+        save_film(recording, file.with_suffix(".gif"), look)
+    page = asked.html or (asked.animate and file.name == "closed_loop")
     if page and (moves or not on_roads or len(recording.movers) == 1):
-        plotting.player_of(result, title=options.look.title or name).save(file.with_suffix(".html"))
+        plotting.player_of(result, title=asked.title or name).save(file.with_suffix(".html"))
 
 
-def save_film(recording: Recording, path: Path, look: Look) -> None:
+def save_film(recording: recordings.Recording, path: Path, look: Look) -> None:
     """Animate a result; the title stands above those on roads alone."""
     plotting = ready_to_draw()
     titled = plotting.Look(title=look.title) if recording.world.lanes else None
     plotting.save_film(recording, path, look=titled)
 
 
-def why_no_film(recording: Recording) -> str:
+def why_no_film(recording: recordings.Recording) -> str:
     """Why nothing moves in a result: it holds no plan; empty if something does."""
     if any(one.has_plan for one in recording.movers):
         return ""
@@ -54,21 +82,21 @@ def why_no_film(recording: Recording) -> str:
 
 
 def ready_to_draw() -> Any:
-    """What draws; Matplotlib writes no documentation of its classes, a fifth of its import."""
+    """What draws; Matplotlib writes no documentation of its classes, a third of its import."""
     from matplotlib import artist
 
     artist.kwdoc = lambda artist: ""
-    from maneuver_automaton import plotting
-
+    artist.Artist._update_set_signature_and_docstring = lambda: None  # type: ignore[attr-defined]
     return plotting
 
 
+@dataclass(slots=True, eq=False)
 class Draughtsman:
     """A process that draws: it loads Matplotlib while this one plans, and draws while it prints."""
 
-    def __init__(self, process: int, pipe: int) -> None:
-        self.process = process
-        self.pipe = pipe  # -1 once it is closed
+    process: int
+    pipe: int  # -1 once it is closed
+    at_hand: ClassVar[Draughtsman | None] = None
 
     def begin(self, draw: Callable[..., None], *args: Any) -> bool:
         """Have it draw; False where it cannot be told what."""
@@ -92,16 +120,18 @@ class Draughtsman:
 
     def dismiss(self) -> None:
         """Have it end, if it has not yet."""
+        Draughtsman.at_hand = None
         if self.pipe >= 0:
             os.close(self.pipe)
         if self.process >= 0:
             os.kill(self.process, signal.SIGKILL)
             os.waitpid(self.process, 0)
+        self.process = self.pipe = -1
 
 
 @contextlib.contextmanager
 def draughtsman(*, wanted: bool) -> Iterator[Draughtsman | None]:
-    """A process that draws, if one is wanted and there is a processor for it; or none."""
+    """Have a process at hand that draws, if one is wanted and there is a processor for it."""
     able = wanted and is_main_program() and sys.platform == "linux"
     if not (able and len(os.sched_getaffinity(0)) > 1):
         yield None
@@ -112,7 +142,7 @@ def draughtsman(*, wanted: bool) -> Iterator[Draughtsman | None]:
         os.close(write)
         _serve(read)
     os.close(read)
-    one = Draughtsman(process, write)
+    Draughtsman.at_hand = one = Draughtsman(process, write)
     try:
         yield one
     finally:
@@ -123,17 +153,18 @@ def _serve(read: int) -> None:
     """Load what draws, wait for an order, carry it out and end; who asked does what fails."""
     code = 1
     try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        nowhere = os.open(os.devnull, os.O_RDWR)
+        for one in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(one, signal.SIG_DFL)
         for stream in (0, 1, 2):
-            os.dup2(nowhere, stream)
-        ready_to_draw()
-        from maneuver_automaton.plotting.pictures import figure_of  # noqa: F401
+            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
+        _ = ready_to_draw().figure_of
+        from maneuver_automaton.plotting.pages import prepare
 
+        prepare()
         with os.fdopen(read, "rb") as pipe:
             order = pipe.read()
         if order:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is begun is drawn
             draw, args = pickle.loads(order)
             draw(*args)
             code = 0

@@ -10,16 +10,8 @@ from typing import Any
 
 from maneuver_automaton import exports
 from maneuver_automaton.cli.guard import FOUND, complain
-from maneuver_automaton.cli.inputs import (
-    LookOptions,
-    Parts,
-    make_folder,
-    naming,
-    opened,
-    user_model,
-    writing,
-)
-from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
+from maneuver_automaton.cli.inputs import Parts, make_folder, naming, opened, user_model, writing
+from maneuver_automaton.cli.pictures import LookOptions, ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.earth import degrees_of
@@ -118,26 +110,14 @@ def _export_target(file: Path, out: Path | None, form: Format, kind: str) -> Pat
     return out
 
 
-ENDINGS = {
-    "picture": (".png", ".pdf", ".svg"),
-    "animation": (".gif",),
-    "page": (".html",),
-}
+ENDINGS = {"picture": (".png", ".pdf", ".svg"), "animation": (".gif",), "page": (".html",)}
 
 
-def plot(
-    file: Path,
-    out: Path | None,
-    *,
-    animate: bool,
-    look: LookOptions,
-    html: bool,
-    beside: Path | None,
-) -> int:
+def plot(file: Path, out: Path | None, *, look: LookOptions, beside: Path | None) -> int:
     """Draw a plan.json or closed_loop.json again, still, in motion, or as a page that plays it."""
-    if animate and html:
+    if look.animate and look.html:
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
-    what = "animation" if animate else "page" if html else "picture"
+    what = "animation" if look.animate else "page" if look.html else "picture"
     path = _picture_target(file, out, what)
     with errors_at(file):
         result, name = _result_of(file, beside)

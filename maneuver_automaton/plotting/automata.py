@@ -123,17 +123,12 @@ def save_automaton_figure(
     if automaton.maneuvers:
         many = len(automaton.maneuvers)
         counts += f", {many} maneuver{'s' if many > 1 else ''}"
-    lines, sides = [f"{shortened(name, 60)}: {counts}"], (max(width - MOTIONS, MOTIONS), MOTIONS)
+    lines, mosaic = [f"{shortened(name, 60)}: {counts}"], [["graph", "motions"]]
+    ratios = {"width_ratios": (max(width - MOTIONS, MOTIONS), MOTIONS)}
     if look.is_narrow:
-        high = min(high, width)
-        figure, axes = plain_page(
-            look, lines, [["graph"], ["motions"]], width=width, height=high + MOTIONS,
-            height_ratios=(high, MOTIONS),
-        )  # fmt: skip
-    else:
-        figure, axes = plain_page(
-            look, lines, [["graph", "motions"]], width=width, height=high, width_ratios=sides
-        )
+        high, mosaic = min(high, width), [["graph"], ["motions"]]
+        high, ratios = high + MOTIONS, {"height_ratios": (high, MOTIONS)}
+    figure, axes = plain_page(look, lines, mosaic, width=width, height=high, **ratios)
     graph, motions = axes["graph"], axes["motions"]
     if automaton.maneuvers and not automaton.body_velocities.any():
         draw_maneuvers(motions, automaton.maneuvers)

@@ -30,6 +30,8 @@ def tidy(ax: Axes, *, x: str, y: str) -> None:
     """Label the axes, keep two of the four spines, and draw a faint grid."""
     ax.set_xlabel(x, fontsize=TEXT_PT, color=INK, parse_math=False)
     ax.set_ylabel(y, fontsize=TEXT_PT, color=INK, parse_math=False)
+    if ax.xaxis.get_tick_params().get("labelsize") == SMALL_PT:
+        return  # they are tidy
     ax.tick_params(labelsize=SMALL_PT, color=GREY, labelcolor=INK, length=3.0, width=0.6)
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.6)

@@ -15,7 +15,7 @@ from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import Look, draw_plane, figure_of, save_picture
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.pages import DPI, write_figure
+from maneuver_automaton.plotting.pages import DPI, prepare, write_figure
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
@@ -171,6 +171,18 @@ class TestPages:
         for box in (*axes, *legends):
             assert page.x0 <= box.x0 < box.x1 <= page.x1
             assert page.y0 <= box.y0 < box.y1 <= page.y1
+
+    @pytest.mark.parametrize("look", [Look(), Look(size=(9.0, 2.6))])  # with panels, and without
+    @pytest.mark.parametrize("make", [parking_plan, pushed_loop])
+    def test_axes_made_beforehand_change_no_picture(self, make, look, tmp_path):
+        pictures = []
+        for path in (tmp_path / "plan.png", tmp_path / "prepared.png"):
+            save_picture(make(), path, look=look)
+            with Image.open(path) as image:
+                pictures.append(np.asarray(image, dtype=int))
+            prepare()  # for the next one
+        figure_of(parking_plan())  # has what was prepared last
+        assert np.abs(pictures[0] - pictures[1]).max() <= 2  # of 255, as from run to run
 
     def test_the_title_comes_first_and_stands_alone_in_a_paper(self):
         def said(look):
