@@ -124,7 +124,6 @@ class TestPlan:
         with monkeypatch.context() as meanwhile:
             meanwhile.setattr(fleets, "stopped", lambda: True)
             outcome = job.done(folder)
-            job.write(outcome, folder)
         said = "interrupted before there was a plan"
         why = f"interrupted before all had a plan: east: {said}; north: {said}"
         assert outcome.complaints == (f"no_plan: {why}",)

@@ -101,7 +101,7 @@ class Job:
     options: Options
 
     def done(self, out: Path) -> JobResult:
-        """Do it, for a folder `out`, where nothing of an earlier one is left but its document."""
+        """Do it, and write its document into the folder `out`; no picture."""
         kind, scenario = self._read()
         refuse_unknown(self.path, self.command, kind, self.options, self.parts)
         if kind == "fleet":
@@ -112,13 +112,6 @@ class Job:
         with announced(quiet=self.options.quiet):
             outcome: JobResult = work(self, scenario)
         with writing(out):
-            for name in PICTURES[self.command] if outcome.result is not None else ():
-                (out / name).unlink(missing_ok=True)
-        return outcome
-
-    def write(self, outcome: JobResult, out: Path) -> None:
-        """Write its document."""
-        with writing(out):
             file = out / f"{outcome.file or DOCUMENTS[self.command]}.json"
             source = {"file": self.path, "with": self.parts.beside, "case": self.parts.case}
             write_document(
@@ -127,6 +120,9 @@ class Job:
                 source=source if "vehicles" in outcome.document else None,
                 interrupted=stopped(),
             )
+            for name in PICTURES[self.command] if outcome.result is not None else ():
+                (out / name).unlink(missing_ok=True)  # of an earlier one
+        return outcome
 
     def _read(self) -> tuple[str, Any]:
         if is_road(self.path):
@@ -183,7 +179,6 @@ def _run(command: str, path: Path, out: Path, options: Options, parts: Parts) ->
     job = Job(command=command, path=path, parts=parts, options=options)
     outcome = job.done(out)
     begun = one is not None and not stopped() and one.begin(draw, *job.order(outcome, out))
-    job.write(outcome, out)
     if not begun:
         job.drawn(outcome, out)
     try:
@@ -250,7 +245,6 @@ def _row(
         with contextlib.chdir(folder):
             job = Job(command=command, path=path, parts=parts, options=options)
             outcome = job.done(out)
-            job.write(outcome, out)
             job.drawn(outcome, out)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         reason = explained(error)
