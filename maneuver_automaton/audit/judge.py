@@ -98,6 +98,8 @@ def seen_from(plan: Plan, goal: Goal) -> Plan:
     start = np.array(plan.start)
     places = [0, 1, *range(3, start.size)]
     start[places] -= goal.pose[places]
+    if not plan.maneuvers:
+        return Plan.of_parts(start, plan.trims, plan.durations.tolist(), start_time=0.0)
     return plan.begun_at(start, start_time=0.0)
 
 
