@@ -1,16 +1,60 @@
-"""Where controls lead: the frame's motion over each element, and what is stated of it."""
+"""Where controls lead: stretches cut to elements, the frame's motion over each, what is stated."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.audit._kernels_edges import place_along
-from maneuver_automaton.audit.arrays import Ended, Stated, TimeElements
+from maneuver_automaton.audit.arrays import Ended, Spans, Stated, TimeElements
 from maneuver_automaton.audit.frames import Collocation, FrameMotion
+
+
+@kernel
+def evenly(parts: Array) -> Spans:
+    """Each element (n,) in as many equal stretches at least, and in one."""
+    most = int(np.ceil(np.maximum(parts, 1.0)).sum())
+    element, begin, end = np.empty(most, np.int64), np.empty(most), np.empty(most)
+    s = 0
+    for e in range(parts.size):
+        count = max(math.ceil(parts[e]), 1)
+        for k in range(count):
+            element[s], begin[s], end[s] = e, k / count, (k + 1) / count
+            s += 1
+    return Spans(element, begin, end)
+
+
+@kernel
+def cut(
+    stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_], most: float
+) -> TimeElements:
+    """Runs of one control within a primitive that turn by no more than `most` [rad], or parts.
+
+    A stretch that stands `alone` is a run, in as many equal parts.
+    """
+    n, total = turns.size, parts.sum()
+    first, run, runs = np.empty(total, np.int64), np.empty(n, np.int64), np.empty(total, np.int64)
+    share, lengths = np.empty(total), np.empty(total)
+    count, e, turned, step = 0, 0, 0.0, -1.0
+    for k in range(n):
+        turned += turns[k]
+        before, step = step, math.floor((turned - turns[k]) / most)
+        goes_on = k > 0 and not (alone[k] or alone[k - 1]) and step == before
+        goes_on = goes_on and stated.pieces[k] == stated.pieces[k - 1]
+        if goes_on and (stated.controls[k] == stated.controls[k - 1]).all():
+            lengths[e - 1] += stated.lengths[k]
+        else:
+            for number in range(parts[k]):
+                first[e], runs[e], share[e] = k, count, number / parts[k]
+                lengths[e] = stated.lengths[k] / parts[k]
+                e += 1
+            count += 1
+        run[k] = count - 1
+    return TimeElements(first[:e], share[:e], lengths[:e], runs[:e], run)
 
 
 @inner_kernel
@@ -28,8 +72,8 @@ def _most(known: float, value: float) -> float:
     return value if value > known else known if value == value else math.inf
 
 
-@kernel
-def bounded(
+@inner_kernel
+def _bounded(
     series: Array, nodes: Array, error: Array, twists: Array, lengths: Array, rules: Collocation
 ) -> FrameMotion:
     """A motion whose series (e, n, dof) and `nodes` (e, N, dof) are known, with its bounds."""
@@ -54,8 +98,8 @@ def bounded(
     return FrameMotion(times, series, nodes, speed, turn, bend, swerve, rise, error, length)
 
 
-@kernel
-def motion_along(
+@inner_kernel
+def _motion_along(
     start: Array, twists: Array, lengths: Array, rules: Collocation
 ) -> tuple[Array, Array, Array]:
     """Series, nodes and error from a pose (dof,), under twists (e, N, dof) over lengths (e,) [s].
@@ -88,8 +132,8 @@ def motion_along(
     return series, nodes, error
 
 
-@kernel
-def compared(stated: Stated, elements: TimeElements, motion: FrameMotion, twists: Array) -> Ended:
+@inner_kernel
+def _compared(stated: Stated, elements: TimeElements, motion: FrameMotion, twists: Array) -> Ended:
     """Where stretches end, and the greatest difference to what is stated of poses and twists."""
     n, dof = stated.ends.shape
     ends, share, at = np.empty(n), np.empty(n), np.empty(n, np.int64)
@@ -114,3 +158,22 @@ def compared(stated: Stated, elements: TimeElements, motion: FrameMotion, twists
             for i in range(twists.shape[1] if known == known else 0):
                 off = _most(off, abs(twists[e, i, d] - known) * elements.lengths[e])
     return Ended(ends, at, share, poses, off, turned)
+
+
+@kernel
+def bounded(
+    series: Array, nodes: Array, error: Array, twists: Array, lengths: Array, rules: Collocation
+) -> FrameMotion:
+    """What `_bounded` returns."""
+    return _bounded(series, nodes, error, twists, lengths, rules)
+
+
+@kernel
+def followed(
+    start: Array, twists: Array, stated: Stated, elements: TimeElements, rules: Collocation
+) -> tuple[FrameMotion, Ended]:
+    """The motion from a pose (dof,) under twists (e, N, dof), and how what is stated differs."""
+    lengths = elements.lengths
+    series, nodes, error = _motion_along(start, twists, lengths, rules)
+    frames = _bounded(series, nodes, error, twists, lengths, rules)
+    return frames, _compared(stated, elements, frames, twists)

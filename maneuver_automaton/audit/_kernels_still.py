@@ -119,12 +119,6 @@ def _near(
 
 
 @inner_kernel
-def _sharp(measured: float) -> float:
-    """The least bound that need not be sharper: 1 mm or 1 % below the least one measured."""
-    return measured - max(1e-3, 0.01 * measured)
-
-
-@inner_kernel
 def _nearest(
     ways: Ways,
     body: BodyOutline,
@@ -186,7 +180,9 @@ def _nearest(
             sharper = measured > contact and levels[top] < HALVINGS and halvings < MOST
             if crosses and not sharper:
                 return StillClearance(0.0, 0.0, here, now, True)
-            if sharper and (near.least < _sharp(measured) or undecided):
+            # A bound need not be sharper than 1 mm or 1 % below the least one measured.
+            sharp = measured - max(1e-3, 0.01 * measured)
+            if sharper and (near.least < sharp or undecided):
                 halvings += 1
                 levels[top] += 1
                 half = 0.5 * (now + ends[top])

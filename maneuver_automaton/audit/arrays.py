@@ -79,20 +79,13 @@ class EdgeBoxes(NamedTuple):
     blocks: Array  # (b, 4) around `BLOCK` of them each
 
 
+@by_value
 class Spans(NamedTuple):
     """Stretches of time, in order, each within an element."""
 
     element: IntArray  # (m,)
     begin: Array  # (m,) share of the element
     end: Array  # (m,)
-
-    @classmethod
-    def evenly(cls, parts: Array | IntArray) -> Spans:
-        """Each element (n,) in as many equal stretches at least, and in one."""
-        count = np.maximum(np.ceil(parts), 1.0).astype(np.int64)
-        element = np.repeat(np.arange(count.size), count)
-        number = np.arange(element.size) - (np.cumsum(count) - count)[element]
-        return cls(element, number / count[element], (number + 1) / count[element])
 
     def of(self, rows: Any) -> Spans:
         """Some of them, by number, slice or truth."""
@@ -111,6 +104,7 @@ class Stated(NamedTuple):
     pieces: IntArray  # (n,) number of the primitive
 
 
+@by_value
 class TimeElements(NamedTuple):
     """How stretches are cut: an element is a run of stretches, or a part of one."""
 

@@ -5,7 +5,6 @@ Nothing of what made the plan is used: no group formula, no closed form, no pose
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit import _kernels_drive as kernels
-from maneuver_automaton.audit.arrays import Spans, Stated, TimeElements
+from maneuver_automaton.audit.arrays import Spans, Stated
 from maneuver_automaton.audit.frames import (
     INTEGRAL,
     RULES,
@@ -65,7 +64,16 @@ class DrivenPlan:
         """The frame of what the vehicle carries, placed by the model from the reduced state."""
         which = self.model.part_names.index(name)
         seen = np.asarray(self.model.part_poses(self.states), dtype=np.float64)[..., which, :]
-        return _frames_through(placed(self.frames.nodes, seen), self.frames)
+        poses = placed(self.frames.nodes, seen)
+        poses[..., 2] = np.unwrap(poses[..., 2], axis=1)
+        series, lengths = SERIES @ poses, np.diff(self.frames.times)
+        rates = SLOPE @ poses / lengths[:, None, None]
+        cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+        twists = rates.copy()
+        twists[..., 0] = cosine * rates[..., 0] + sine * rates[..., 1]
+        twists[..., 1] = cosine * rates[..., 1] - sine * rates[..., 0]
+        last = self.frames.error + np.abs(series[:, -2:]).max(axis=(1, 2))
+        return kernels.bounded(series, poses, last, twists, lengths, RULES)
 
     def twists_at(self, elements: IntArray, shares: Array) -> Array:
         """Twists (m, dof) at shares of elements, (m,) each."""
@@ -110,23 +118,30 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     turns = np.abs(begin_twists[..., 2]) * stated.lengths
     parts = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
     alone = parts > 1
+    has_states = bool(stated.states.shape[1])
     for _ in range(HALVINGS):
-        elements = cut(stated, turns, parts, alone)
-        reduced, twists, frames = _integrated(plan.start, model, stated, elements, begin_twists)
+        elements = kernels.cut(stated, turns, parts, alone, TURN)
+        first = elements.first
+        twists = np.repeat(begin_twists[first, None], N, axis=1)
+        reduced = WITHOUT
+        if has_states:
+            begins, controls = stated.states[first], stated.controls[first]
+            guess = begins + elements.share[:, None] * (stated.end_states[first] - begins)
+            begun = elements.share == 0.0
+            reduced = reduced_states(model, controls, elements.lengths, guess, begun)
+            twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
+        frames, there = kernels.followed(plan.start.copy(), twists, stated, elements, RULES)
         rough = ~(np.maximum(reduced.error, frames.error) <= EXACT * (1.0 + frames.length))
         if not rough.any():
             break
         again = np.isin(elements.run, elements.runs[rough])
         parts = np.where(again & alone, 2 * parts, parts)
         alone = alone | again
-    # What a reduced state is off moves the vehicle for as long as it is driven.
-    has_states = bool(reduced.series.shape[2])
-    if has_states:
-        doubt = reduced.error + reduced.jumps / reduced.error.size
-        frames = frames._replace(error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
-    there = kernels.compared(stated, elements, frames, twists)
     off, states = there.off, stated.end_states
     if has_states:
+        # What a reduced state is off moves the vehicle for as long as it is driven.
+        doubt = reduced.error + reduced.jumps / reduced.error.size
+        frames = frames._replace(error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
         states = values_at(reduced.series[there.element], np.minimum(there.share, 1.0))
         begun_anew = np.abs(states[:-1] - stated.states[1:]).max(initial=0.0)
         off = float(np.max([off, np.abs(states - stated.end_states).max(), begun_anew]))
@@ -146,63 +161,18 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     )
 
 
-def cut(stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_]) -> TimeElements:
-    """Runs of one control within a primitive that turn by no more than `TURN`, or equal parts."""
-    controls, pieces = stated.controls, stated.pieces
-    turned = np.floor((np.cumsum(turns) - turns) / TURN)
-    breaks = np.ones(pieces.size, dtype=np.bool_)
-    breaks[1:] = (pieces[1:] != pieces[:-1]) | alone[1:] | alone[:-1] | (turned[1:] != turned[:-1])
-    breaks[1:] |= (controls[1:] != controls[:-1]).any(axis=1)
-    run, begins = np.cumsum(breaks) - 1, np.flatnonzero(breaks)
-    of, share, _ = Spans.evenly(parts[begins])
-    lengths = np.bincount(run, weights=stated.lengths) / parts[begins]
-    return TimeElements(begins[of], share, lengths[of], of, run)
-
-
-def _integrated(
-    start: Array, model: Model, stated: Stated, elements: TimeElements, begin_twists: Array
-) -> tuple[Reduced, Array, FrameMotion]:
-    """Reduced states on all elements, twists (e, N, dof) at the nodes, then the poses."""
-    first, share = elements.first, elements.share[:, None]
-    guess = stated.states[first] + share * (stated.end_states[first] - stated.states[first])
-    controls = stated.controls[first]
-    reduced = reduced_states(model, controls, elements.lengths, guess, elements.share == 0.0)
-    twists = np.empty((first.size, N, start.size))
-    twists[:] = begin_twists[first, None]  # of a vehicle without a state, all along
-    if guess.shape[1]:
-        twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
-    return reduced, twists, frames_along(start, twists, elements.lengths)
-
-
-def _frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
-    """Of what is at poses (e, N, dof) at the nodes of the elements of other frames."""
-    poses[..., 2] = np.unwrap(poses[..., 2], axis=1)
-    series = SERIES @ poses
-    lengths = np.diff(like.times)
-    rates = SLOPE @ poses / lengths[:, None, None]
-    cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    twists = rates.copy()
-    twists[..., 0] = cosine * rates[..., 0] + sine * rates[..., 1]
-    twists[..., 1] = cosine * rates[..., 1] - sine * rates[..., 0]
-    last = like.error + np.abs(series[:, -2:]).max(axis=(1, 2))
-    return kernels.bounded(series, poses, last, twists, lengths, RULES)
-
-
-def frames_along(start: Array, twists: Array, lengths: Array) -> FrameMotion:
-    """From a pose (dof,), under twists (e, N, dof) at the nodes of elements of lengths (e,) [s]."""
-    found = kernels.motion_along(start.copy(), twists, lengths, RULES)
-    return kernels.bounded(*found, twists, lengths, RULES)
-
-
 def _standing(plan: Plan, model: Model) -> DrivenPlan:
     """Of a plan that lasts no time: one element of rest."""
-    still = np.zeros((1, N, plan.start.size))
+    still, here = np.zeros((1, N, plan.start.size)), np.zeros((1, N + 1, plan.start.size))
+    here[0, 0] = plan.start
     # Without a trim it rests, with all at zero.
     states = plan.trims[0].reduced_state if plan.trims else np.zeros(len(model.reduced_names))
     return DrivenPlan(
         plan=plan,
         model=model,
-        frames=frames_along(plan.start, still, np.full(1, NOTHING)),
+        frames=kernels.bounded(
+            here, still + plan.start, np.zeros(1), still, np.full(1, NOTHING), RULES
+        ),
         twists=still,
         states=np.tile(states, (1, N, 1)),
         end=plan.start,
@@ -224,26 +194,19 @@ def stated_by(plan: Plan) -> Stated | None:
     for _, run in groupby(
         lasting.tolist(), key=lambda k: -1 if isinstance(plan.primitives[k], Trim) else k
     ):
-        numbers = np.array(list(run))
+        numbers = list(run)
         pieces = [plan.primitives[k] for k in numbers]
+        if isinstance(pieces[0], Maneuver):
+            rows.append(_maneuver(pieces[0], numbers[0], poses[numbers[0]]))
+            continue
         trims = [one for one in pieces if isinstance(one, Trim)]
-        if trims:
-            rows.append(_trims(trims, numbers, lengths[numbers], poses[numbers + 1]))
-        rows += [
-            _maneuver(one, k, poses[k])
-            for one, k in zip(pieces, numbers.tolist(), strict=True)
-            if isinstance(one, Maneuver)
-        ]
+        controls, twists = ([one.control for one in trims], [one.body_velocity for one in trims])
+        states, which = np.array([one.reduced_state for one in trims]), np.array(numbers)
+        known = states, states, poses[which + 1], np.array(twists), which
+        rows.append(Stated(lengths[which], np.array(controls), *known))
     if len(rows) < 2:
         return rows[0] if rows else None
     return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))
-
-
-def _trims(trims: Sequence[Trim], numbers: IntArray, lengths: Array, ends: Array) -> Stated:
-    states = np.array([trim.reduced_state for trim in trims])
-    controls = np.array([trim.control for trim in trims])
-    twists = np.array([trim.body_velocity for trim in trims])
-    return Stated(lengths, controls, states, states, ends, twists, numbers)
 
 
 def _maneuver(maneuver: Maneuver, number: int, begin: Array) -> Stated:
@@ -265,12 +228,15 @@ def _maneuver(maneuver: Maneuver, number: int, begin: Array) -> Stated:
 
 
 class Reduced(NamedTuple):
-    """Reduced states over elements; `nodes` is (e, 1, 0) for a vehicle without."""
+    """Reduced states over elements."""
 
     nodes: Array  # (e, N, n_z)
     series: Array  # (e, N + 1, n_z) Legendre series over the share of an element
     error: Array  # (e,) what the last terms of a series are; inf where there is none
     jumps: float  # what is left between elements, added up
+
+
+WITHOUT = Reduced(np.zeros((1, 1, 0)), np.zeros((1, N + 1, 0)), np.zeros(1), 0.0)
 
 
 def reduced_states(
@@ -285,11 +251,8 @@ def reduced_states(
     long, by nobody: where it is 1e-9 from what the plan states, it goes on there, and the jump
     counts. `stated` (e,) is where the guesses are what the plan states.
     """
-    n = len(lengths)
-    if not guess.shape[1]:
-        return Reduced(np.zeros((n, 1, 0)), np.zeros((n, N + 1, 0)), np.zeros(n), 0.0)
     begins, h = guess.copy(), lengths[:, None, None]
-    restarted = np.zeros(n - 1, dtype=np.bool_)
+    restarted = np.zeros(len(lengths) - 1, dtype=np.bool_)
     for sweep in range(SWEEPS):
         nodes, rates, failed = _solved(model, begins, controls, lengths)
         if failed.any():

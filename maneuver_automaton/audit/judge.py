@@ -98,6 +98,8 @@ def seen_from(plan: Plan, goal: Goal) -> Plan:
     start = np.array(plan.start)
     places = [0, 1, *range(3, start.size)]
     start[places] -= goal.pose[places]
+    if not plan.maneuvers:
+        return Plan.of_parts(start, plan.trims, plan.durations.tolist(), start_time=0.0)
     return plan.begun_at(start, start_time=0.0)
 
 
@@ -177,7 +179,15 @@ def audit_plan(
         abs(float(t.body_velocity[2])) * d for t, d in zip(near.trims, near.durations, strict=True)
     )
     if turned > MOST_TURNED:
-        return _not_driven(near, goal, turned)
+        missed = distance_to(near.end, goal)
+        return Audit(
+            passed=False,
+            max_dynamics_defect=math.inf,
+            min_clearance_m=None,
+            terminal_position_m=missed.position_m,
+            terminal_heading_rad=missed.heading_rad,
+            reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
+        )
     drive = driven(near, model)
     missed = distance_to(drive.end, goal)
     reasons = []
@@ -189,8 +199,12 @@ def audit_plan(
     if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
         reasons.append(f"its last heading is {missed.heading_rad:.3g} rad off")
     reasons += _beyond_limits(drive)
-    if states is not None:
-        reasons += _wrong_ends(near, states)
+    ends = ("begins", near.trims[:1]), ("ends", near.trims[-1:])
+    for (what, trims), state in zip(ends, states or (), strict=states is not None):
+        for trim in trims:
+            off = np.abs(trim.reduced_state - state).max(initial=0.0)
+            if off > STATE_TOLERANCE:
+                reasons.append(f"it {what} in trim {trim.name!r}, {off:.3g} off the reduced state")
     origin = origin_of(goal.pose)
     bodies = {"": _body(drive.frames, footprint, plan, goal, body_height)}
     for name, shapes in (parts or {}).items() if obstacles or zones else ():
@@ -226,19 +240,6 @@ def audit_plan(
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
         place_price=sum(prices) if prices else None,
-    )
-
-
-def _not_driven(near: Plan, goal: Goal, turned: float) -> Audit:
-    """The audit of a plan that turns too much [rad] for anybody to drive it again."""
-    missed = distance_to(near.end, goal)
-    return Audit(
-        passed=False,
-        max_dynamics_defect=math.inf,
-        min_clearance_m=None,
-        terminal_position_m=missed.position_m,
-        terminal_heading_rad=missed.heading_rad,
-        reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
     )
 
 
@@ -357,7 +358,7 @@ def _body(
         offset=complex(*(goal.pose[:2] - origin_of(goal.pose))),
         doubt=frames.doubt(),
         height=height,
-        base=float(goal.pose[3:].sum()),
+        base=sum(goal.pose[3:].tolist(), 0.0),
         clock=plan.start_time,
     )
 
@@ -379,13 +380,13 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
     ):
         if not names:
             continue
-        most, least = values.max(axis=0).tolist(), values.min(axis=0).tolist()
-        rows = zip(names, limits.tolist(), most, least, strict=True)
-        for name, (low, high), greatest, smallest in rows:
-            excess = max(greatest - high, low - smallest)
+        excess = np.maximum(values.max(axis=0) - limits[:, 1], limits[:, 0] - values.min(axis=0))
+        for k in np.flatnonzero(excess > LIMIT_TOLERANCE).tolist():
+            low, high = limits[k].tolist()
             size = max([1.0, *(abs(limit) for limit in (low, high) if math.isfinite(limit))])
-            if excess > LIMIT_TOLERANCE * size:
-                reasons.append(f"{name} is {excess:.3g} beyond its limits [{low:.6g}, {high:.6g}]")
+            if excess[k] > LIMIT_TOLERANCE * size:
+                beyond = f"beyond its limits [{low:.6g}, {high:.6g}]"
+                reasons.append(f"{names[k]} is {excess[k]:.3g} {beyond}")
     limit = getattr(model, "max_lateral_acceleration", None)
     if limit is not None:
         spans, _ = drive.between_samples()
@@ -396,19 +397,6 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
             reasons.append(
                 f"the lateral acceleration is {across:.6g} m/s^2, beyond {limit:g} m/s^2"
             )
-    return reasons
-
-
-def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
-    """How far the first and last reduced states are from what they must be."""
-    if not plan.trims:
-        return []
-    reasons = []
-    ends = (("begins", plan.trims[0], states[0]), ("ends", plan.trims[-1], states[1]))
-    for what, trim, expected in ends:
-        off = float(np.abs(trim.reduced_state - expected).max(initial=0.0))
-        if off > STATE_TOLERANCE:
-            reasons.append(f"it {what} in trim {trim.name!r}, {off:.3g} off the reduced state")
     return reasons
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit._kernels_edges import edges_near
 from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outline, Points
 from maneuver_automaton.audit.frames import placed
 from maneuver_automaton.collision.motion import Knots, Motion
@@ -274,15 +273,8 @@ class Surroundings:
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it is static
     movers: MovingEdges
     still: IntArray  # (k,) numbers of the static edges
-    index: EdgeBoxes  # of these
+    index: EdgeBoxes  # of these; where one of what may be flown over is near, all of its edges are
     rounds: bool  # whether any edge has a radius
-
-    def near(self, boxes: Array) -> tuple[IntArray, IntArray]:
-        """Which boxes (m, 4) [low x, low y, high x, high y] may meet which still edges.
-
-        Of what has a height, and so may be flown over, all edges if one of them does.
-        """
-        return edges_near(self.index, np.ascontiguousarray(boxes))
 
 
 def origin_of(place: ArrayLike) -> tuple[float, float]:

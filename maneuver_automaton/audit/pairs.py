@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit._kernels_drive import evenly
+from maneuver_automaton.audit._kernels_edges import edges_near
 from maneuver_automaton.audit.arrays import FIRST_WITHIN, FURTHER, SPARE, Outline, Points, Spans
 from maneuver_automaton.audit.outlines import (
     Surroundings,
@@ -39,7 +41,7 @@ def spans_within(body: AuditedBody, first: float, last: float) -> Spans:
     frames, times = body.frames, body.frames.times
     lengths = times[1:] - times[:-1]
     steps = max(frames.length / LONGEST, body.outline.size, 1e-9)
-    every = Spans.evenly(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
+    every = evenly(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
     if first <= 0.0 and last >= times[-1]:
         return every
     element, begin, end = every
@@ -100,7 +102,7 @@ def _overlapped_still(body: AuditedBody, around: Surroundings, here: _Here) -> i
     # What holds a point has an edge to its right.
     firsts = here.firsts.tolist()
     boxes += [(at.real, at.imag, math.inf, at.imag) for at in firsts]
-    which, still = around.near(np.array(boxes))
+    which, still = edges_near(around.index, np.array(boxes))
     if body.in_space:
         tall = ~np.isfinite(around.heights[still]).all(axis=1)
         which, still = which[tall], still[tall]
@@ -158,7 +160,7 @@ def nearest_still_pairs(
     within = FIRST_WITHIN * body.outline.size + SPARE
     while True:
         grown = (pad + within) * np.array([-1.0, -1.0, 1.0, 1.0])
-        span, edge = around.near(boxes + grown)
+        span, edge = edges_near(around.index, boxes + grown)
         kept = _meets(around, places, own + grown, span, edge)
         pairs = EdgePairs(places, span[kept], edge[kept], None)
         if not pairs.edge.size:

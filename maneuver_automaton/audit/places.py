@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.audit._kernels_drive import evenly
 from maneuver_automaton.audit._kernels_edges import distances
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
@@ -70,7 +71,7 @@ def price_again(
 
     if not lasting.size:
         return 0.0
-    spans = Spans.evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
+    spans = evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
     done = 0.0
     for _ in range(MOST_ROUNDS):
         values = rates(spans)

@@ -38,7 +38,6 @@ from maneuver_automaton.collision.swept import (
 )
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups._kernels import coasted_at
-from maneuver_automaton.groups.se2 import after, displacements
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
@@ -212,8 +211,9 @@ class FclChecker:
         while parts.coast.size:
             ask()
             of = parts.coast
-            slices = zip(of.tolist(), parts.level.tolist(), strict=True)
-            solids = [_sliced(self._body, kinds[k], level) for k, level in slices]
+            slices = list(zip(of.tolist(), parts.level.tolist(), strict=True))
+            made = {(k, level): _sliced(self._body, kinds[k], level) for k, level in set(slices)}
+            solids = [made[one] for one in slices]
             poses = coasted_at(starts, twists, of, parts.begins)
             hits = _touching([solid for solid, _ in solids], poses, laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
@@ -371,7 +371,7 @@ def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Arr
     # From each place the ways to both ends are together no longer than the coast: an ellipse.
     lasting = np.minimum(durations, math.tau / np.maximum(np.abs(twists[:, 2]), LEAST_TURN))
     begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
-    ends = after(starts, displacements(twists, lasting))[:, :2]
+    ends = coasted_at(starts, np.array(twists), np.arange(len(starts)), lasting)[:, :2]
     half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
     return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
 

@@ -5,6 +5,7 @@ All are solids, and closed: to touch one is to collide with it.
 
 from __future__ import annotations
 
+import functools
 import math
 import reprlib
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ from maneuver_automaton.groups import SE2, LieGroup
 PLAIN = 1e-6  # sine of the angle at a corner, beyond which rounding does not decide its side
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Polygon:
     """A polygon, concave or with holes if need be, its corners in either order.
 
@@ -68,7 +69,7 @@ class Polygon:
         holes = tuple(_ring("polygon: a hole", hole) for hole in self.holes)
         object.__setattr__(self, "holes", holes)
 
-    @property
+    @functools.cached_property
     def is_plain(self) -> bool:
         """Whether its ring surely surrounds its area once: of three or four corners, all one way.
 
@@ -79,9 +80,8 @@ class Polygon:
         at = [complex(x, y) for x, y in self.corners.tolist()]
         sides = [b - a for a, b in zip(at, at[1:] + at[:1], strict=True)]
         turns = [a.conjugate() * b for a, b in zip(sides, sides[1:] + sides[:1], strict=True)]
-        least = [PLAIN * abs(turn) for turn in turns]
-        left = all(turn.imag > by for turn, by in zip(turns, least, strict=True))
-        return left or all(-turn.imag > by for turn, by in zip(turns, least, strict=True))
+        both = [(turn.imag, PLAIN * abs(turn)) for turn in turns]
+        return all(by > least for by, least in both) or all(-by > least for by, least in both)
 
     def moved(self, by: LieGroup) -> Polygon:
         """The shape moved by a planar pose."""

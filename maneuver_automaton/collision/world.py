@@ -209,7 +209,7 @@ def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
         if isinstance(obstacle.shape, Box):
             return (*obstacle.shape.center.tolist(), obstacle.shape.heading)
         ring = obstacle.shape.corners
-        edge = np.roll(ring, -1, axis=0) - ring
+        edge = np.concatenate([ring[1:], ring[:1]]) - ring
         length = np.hypot(edge[:, 0], edge[:, 1])
         longest = int(np.argmax(np.round(length / length.max(), 6))) if length.max() > 0.0 else -1
         if longest >= 0:

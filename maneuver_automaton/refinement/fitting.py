@@ -294,9 +294,9 @@ def has_short_coasts(problem: Problem, plan: Plan) -> bool:
 
 def _short(plan: Plan) -> list[int]:
     """Trims of a plan that move for less than 20 ms and could last longer, the shortest first."""
-    times = plan.durations.tolist()
-    longest = [0.0 if one.is_rest else min(SHORT, one.max_duration) for one in plan.trims]
-    short = [k for k, one in enumerate(times) if 0.0 < one < longest[k] * (1.0 - 1e-9)]
+    times, trims = plan.durations.tolist(), plan.trims
+    short = [k for k, one in enumerate(times) if 0.0 < one < SHORT and not trims[k].is_rest]
+    short = [k for k in short if times[k] < min(SHORT, trims[k].max_duration) * (1.0 - 1e-9)]
     return sorted(short, key=times.__getitem__)
 
 

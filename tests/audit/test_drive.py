@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.audit import _kernels_drive as kernels
-from maneuver_automaton.audit.arrays import Stated
-from maneuver_automaton.audit.drive import TURN, cut, frames_along
-from maneuver_automaton.audit.frames import INTEGRAL, SERIES, SLOPES, TO_NODES, N
+from maneuver_automaton.audit.arrays import Stated, TimeElements
+from maneuver_automaton.audit.drive import TURN
+from maneuver_automaton.audit.frames import INTEGRAL, RULES, SERIES, SLOPES, TO_NODES, N
 
 
 def before(steps):
@@ -28,7 +28,9 @@ def test_a_motion_and_its_bounds(dof):
     rng = np.random.default_rng(dof)
     twists, lengths = rng.normal(size=(5, N, dof)), rng.uniform(0.1, 1.0, 5)
     start, h = rng.normal(size=dof), lengths[:, None]
-    motion = frames_along(start, twists, lengths)
+    rows = np.arange(5)
+    elements = TimeElements(rows, np.zeros(5), lengths, rows, rows)
+    motion = kernels.followed(start, twists, stated(rng, n=5, dof=dof), elements, RULES)[0]
     heading = start[2] + before(lengths * (INTEGRAL @ twists[..., 2:3]).sum(axis=(1, 2)))[:-1, None]
     heading = heading + h * (twists[..., 2] @ TO_NODES.T)
     turned = np.exp(1j * heading) * (twists[..., 0] + 1j * twists[..., 1])
@@ -57,7 +59,7 @@ def test_runs_hold_one_control_of_one_primitive_and_turn_little():
     for _ in range(20):
         of, turns, alone = stated(rng), rng.uniform(0.0, 0.5, 9), rng.random(9) < 0.2
         parts = np.where(alone, 3, 1)
-        found = cut(of, turns, parts, alone)
+        found = kernels.cut(of, turns, parts, alone, TURN)
         passed = np.floor(before(turns)[:-1] / TURN)
         same = (of.controls[1:] == of.controls[:-1]).all(axis=1)
         same &= (of.pieces[1:] == of.pieces[:-1]) & (passed[1:] == passed[:-1])
@@ -77,17 +79,18 @@ def test_what_is_stated_is_compared_where_it_ends(off):
     of = stated(np.random.default_rng(2), n=2)._replace(
         lengths=np.array([1.0, 2.0]), controls=twists[:, :2].copy(), twists=twists
     )
-    elements = cut(of, np.array([0.0, 1.0]), np.array([1, 2]), np.array([False, True]))
+    turns, alone = np.array([0.0, 1.0]), np.array([False, True])
+    elements = kernels.cut(of, turns, np.array([1, 2]), alone, TURN)
     along = np.repeat(twists[elements.first][:, None], N, axis=1)
-    motion = frames_along(np.zeros(3), along, elements.lengths)
     ends = np.array([[1.0, 0.0, 0.0], [1.0 + 2.0 * np.sin(1.0), 2.0 - 2.0 * np.cos(1.0), 1.0]])
-    good = kernels.compared(of._replace(ends=ends), elements, motion, along)
+
+    def compared(of):
+        return kernels.followed(np.zeros(3), along, of, elements, RULES)[1]
+
+    good = compared(of._replace(ends=ends))
     assert good.poses == pytest.approx(ends, abs=1e-14)
     assert good.off < 1e-13
-    bad = kernels.compared(
-        of._replace(ends=ends + np.array([0.0, 0.0, off])), elements, motion, along
-    )
+    bad = compared(of._replace(ends=ends + np.array([0.0, 0.0, off])))
     expected = np.inf if np.isnan(off) else off
     assert (bad.off, bad.turned) == (pytest.approx(expected), pytest.approx(expected))
-    unstated = of._replace(ends=ends, twists=np.full((2, 3), np.nan))
-    assert kernels.compared(unstated, elements, motion, along).off < 1e-13
+    assert compared(of._replace(ends=ends, twists=np.full((2, 3), np.nan))).off < 1e-13
