@@ -15,7 +15,7 @@ from maneuver_automaton import place_prices
 from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first, kept_with
-from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
+from maneuver_automaton._limits import MOST_HEADING, MOST_TURNS, check_heading, check_size
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (
@@ -408,10 +408,9 @@ class Problem:
         freeze(self, "start", last=dof)
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
-        check_size(
-            "start: pose", self.start[:2] if dof == 3 else self.start[[0, 1, *range(3, dof)]]
-        )
-        check_heading("start: pose", self.start)
+        if not max(map(abs, self.start.tolist())) <= MOST_HEADING:
+            check_size("start: pose", self.start[[0, 1, *range(3, dof)]])
+            check_heading("start: pose", self.start)
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
 
@@ -593,7 +592,7 @@ class Problem:
         """Invariant cost of trims that last `durations` (n,) [s], with the switches between."""
         if not trims:
             return 0.0
-        coasting = float(self.rates_of_trims(trims) @ durations)
+        coasting = float(_rates_of_trims(self.automaton, self.cost, tuple(trims)) @ durations)
         if not prices_switches(self.cost):
             return coasting
         return coasting + self.cost.switching(np.array([trim.body_velocity for trim in trims]))
@@ -684,16 +683,20 @@ class Problem:
         moved: Problem = object.__new__(Problem)
         if goals is not None:
             changed["goals"] = _as_goals(goals)
-        known = {name: self.__dict__[name] for name in _FIELDS}
+        moved.__dict__.update(self._same, **changed)
         if horizon is None:
-            known["_setting"] = self.setting
-        moved.__dict__.update(known, moves=self.moves, **changed)
+            moved.__dict__["_setting"] = self.setting
         if goals is None and trim is None and state is None:
             moved._check_start()
         else:
             moved._settle_states()
             moved._check_ends()
         return moved
+
+    @functools.cached_property
+    def _same(self) -> dict[str, Any]:
+        """What problems from other starts have in common with this one."""
+        return {"moves": self.moves, **{one.name: self.__dict__[one.name] for one in fields(self)}}
 
     @property
     def setting(self) -> Problem:
@@ -798,9 +801,6 @@ class Problem:
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return any(moves(obstacle) for obstacle in self.obstacles)
-
-
-_FIELDS = tuple(one.name for one in fields(Problem))
 
 
 def settled_state(

@@ -240,7 +240,7 @@ class Plan(Played):
     @cached_property
     def duration(self) -> float:
         """Time the plan takes [s], rest included."""
-        return float(self.primitive_durations.sum())
+        return float(np.add.reduce(self.primitive_durations))
 
     @cached_property
     def switching_times(self) -> Array:

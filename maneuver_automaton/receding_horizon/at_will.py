@@ -33,7 +33,7 @@ from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import LATE, StepSearch
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.limits import outside, sole_bound
+from maneuver_automaton.search.limits import busy_bound, outside, sole_bound
 from maneuver_automaton.search.result import SearchStatus, plan_of, tied
 from maneuver_automaton.words.word import is_word_of
 
@@ -115,13 +115,14 @@ class InFreeSpace(StepSearch):
         # which has this `cost`; nor does one of S trims that begins with the trim driven since, for
         # as long as one trim was driven alone. For with the part that was driven in front, W would
         # have been a word of at most S trims from there, to the same goal, and cheaper than the
-        # plan found. Its cost is the sum, since switches cost nothing, and no time is fixed or
-        # limited. Where no other plan cost as much there, none does here.
+        # plan found. Its cost is the sum, since switches cost nothing, and no time is limited, or
+        # a word that would have been too late there costs too much. Where no other plan cost as
+        # much there, none does here.
         # Source: Bellman (1957), *Dynamic Programming*, Sec. III.3.
         now, here, last = self.now, self.here, self.now.last
-        horizon = here.horizon
-        limited = horizon.time is not None or horizon.max_time is not None
-        if last is None or limited or prices_switches(here.cost) or horizon.max_trims is None:
+        if last is None or here.horizon.max_time is not None or here.horizon.max_trims is None:
+            return None
+        if prices_switches(here.cost) or not tied(cost) < busy_bound(here, now.passed):
             return None
         if not now.rounding or now.changed or not (last.exhaustive and last.is_sole):
             return None

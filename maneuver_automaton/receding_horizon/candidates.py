@@ -86,7 +86,7 @@ def is_uniform(plan: Plan, cost: StageCost) -> bool:
     return bool(report.spread <= UNIFORM) and bool(np.isfinite(report.mean))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(slots=True, eq=False, kw_only=True)
 class StepPlan:
     """A plan that may be applied."""
 
@@ -133,7 +133,7 @@ def candidate(
             plan = paced
     cost = here.cost_of(plan)
     fixed = bool(here.obstacles or here.zones or here.via or any(plan.maneuvers))
-    ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
+    ordered = plan if fixed else costliest_first(plan, here)
     if ordered is not plan:
         costlier = here.cost_of(ordered)
         if costlier <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):

@@ -17,7 +17,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
 from maneuver_automaton.planning.on_the_way import Passed, going_on, still_ahead
 from maneuver_automaton.primitives.on_the_spot import state_of
-from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.at_will import AmongObstacles, InFreeSpace, as_it_stands
 from maneuver_automaton.receding_horizon.candidates import (
     StepPlan,
@@ -248,7 +248,7 @@ class RecedingHorizon:
         if passed is None and last is not None and self.problem.via:
             passed = going_on(self.problem, last.passed, first_part(last.plan, driven), ended=pose)
         # Have the problem ahead be the one without what was passed on the way.
-        via = still_ahead(self.problem, passed or ())
+        via = still_ahead(self.problem, passed or ()) if self.problem.via else ()
         if via != self.ahead.via or self.ahead.obstacles is not self.problem.obstacles:
             self.ahead = replace(self.problem, via=via)
             if not via:
@@ -256,10 +256,13 @@ class RecedingHorizon:
         automaton = self.problem.automaton
         known = None if state is None else state_of(automaton.model, state, "measured")
         trim = automaton.trim_names[automaton.rest or 0]  # where a plan is held, it says which
+        horizon = None  # that of the problem
+        if self.arrival is not None:
+            horizon = replace(self.problem.horizon, time=max(self.arrival - at, NOTHING))
         here = self.ahead.starting_at(
             pose,
             time=at,
-            horizon=self._horizon(at),
+            horizon=horizon,
             trim=None if last is None or self.problem.start_state is None else trim,
             state=known if last is None else None,
         )
@@ -295,14 +298,7 @@ class RecedingHorizon:
         elif now.last is None or now.off_plan or not now.last.decision.leads:
             self.proven.leave()
         here = now.as_it_moves
-        return 0.0 if here is None else self.proven.known(here, _accumulated(now))
-
-    def _horizon(self, at: float) -> Horizon:
-        """The horizon of a step at a time [s] of the world's clock."""
-        horizon = self.problem.horizon
-        if self.arrival is None:
-            return horizon
-        return replace(horizon, time=max(self.arrival - at, NOTHING))
+        return 0.0 if here is None else self.proven.known(here, now.accumulated)
 
     def _cut(self, last: Step, passed: float) -> Step:
         """The last step as it was driven, for `passed` seconds; one cut short is not counted."""
@@ -334,7 +330,7 @@ class RecedingHorizon:
             value=value,
             applied=applied,
             applied_cost=cost_until(here, plan, applied, whole=whole),
-            accumulated_cost=_accumulated(now),
+            accumulated_cost=now.accumulated,
             origin=chosen.origin,
             replanned=last is not None and not same,
             shifted_value=chosen.shifted_value,
@@ -390,12 +386,7 @@ class RecedingHorizon:
         least, moving = search.lower_bound(), now.as_it_moves
         if self.proven is None or moving is None:
             return least
-        return max(least, self.proven.prove(moving, chosen.cost, _accumulated(now), now.budget))
-
-
-def _accumulated(now: Situation) -> float:
-    """Cost of what has been driven until now."""
-    return 0.0 if now.last is None else now.last.accumulated_cost + now.last.applied_cost
+        return max(least, self.proven.prove(moving, chosen.cost, now.accumulated, now.budget))
 
 
 def _is_taken(violation: Violation, now: Situation) -> bool:

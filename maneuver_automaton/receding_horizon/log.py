@@ -112,7 +112,7 @@ class Step:
     @property
     def control(self) -> Array | None:
         """Control (n_u,) that holds from `time`; None if there is nothing to do."""
-        if not self.plan.primitives:
+        if not (self.plan.maneuvers and self.plan.primitives):
             return self.plan.trims[0].control if self.plan.trims else None
         first = self.plan.primitives[0]
         if isinstance(first, Maneuver) and first.course is not None:
@@ -183,16 +183,12 @@ class ClosedLoop(Played):
     @property
     def violations(self) -> Iterator[tuple[int, Violation]]:
         """Number of the step and the guarantee it broke, in order."""
-        for step in self.steps:
-            for violation in step.violations:
-                yield step.number, violation
+        return ((step.number, one) for step in self.steps for one in step.violations)
 
     @property
     def disturbed(self) -> Iterator[tuple[int, Violation]]:
         """Number of the step and the guarantee that a disturbance took from it, in order."""
-        for step in self.steps:
-            for violation in step.disturbed:
-                yield step.number, violation
+        return ((step.number, one) for step in self.steps for one in step.disturbed)
 
     @property
     def solve_s(self) -> Array:

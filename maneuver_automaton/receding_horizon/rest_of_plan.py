@@ -11,8 +11,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import MOST
+from maneuver_automaton._limits import FASTEST
 from maneuver_automaton.automaton import Plan, Primitive
-from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of
+from maneuver_automaton.automaton.cutting import NOTHING, joined, last_times, tail_of
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -35,23 +36,33 @@ def rest_of(
 
     Source: the paper, Sec. 4, after Algorithm 14.
     """
-    left = without_nothing(tail_of(plan, after, start=start))
-    return left if pad is None else rested(left, pad, after)
+    if plan.maneuvers:
+        left = without_nothing(tail_of(plan, after, start=start))
+        return left if pad is None else rested(left, pad, after)
+    times, at = last_times(plan.durations.tolist(), after), plan.start_time + after
+    word, times = merged(plan.trims[len(plan.trims) - len(times) :], times)
+    if pad is not None and after > NOTHING:
+        word, times = _and_rest(word, times, pad, after)
+    return Plan.of_parts(plan.pose_at(at) if start is None else start, word, times, start_time=at)
 
 
 def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
     """The plan with `duration` more seconds of rest: of the one it ends in, otherwise of `pad`."""
     if not duration > NOTHING:
         return plan
-    times, between = plan.durations.tolist(), plan.maneuvers
-    if plan.trims and plan.trims[-1].is_rest:
-        word, times[-1] = plan.trims, times[-1] + duration
-    else:
-        word, times = (*plan.trims, pad), [*times, duration]
-        between = (*between, None) if between else ()
-    if not between:
+    word, times = _and_rest(plan.trims, plan.durations.tolist(), pad, duration)
+    if not plan.maneuvers:
         return Plan.of_parts(plan.start, *merged(word, times), start_time=plan.start_time)
-    return without_nothing(replace(plan, trims=word, durations=times, maneuvers=between))
+    between = (*plan.maneuvers, None)[: len(word) - 1]
+    return without_nothing(replace(plan, trims=word, durations=np.array(times), maneuvers=between))
+
+
+def _and_rest(
+    word: tuple[Trim, ...], times: list[float], pad: Trim, duration: float
+) -> tuple[tuple[Trim, ...], list[float]]:
+    if word and word[-1].is_rest:
+        return word, [*times[:-1], times[-1] + duration]
+    return (*word, pad), [*times, duration]
 
 
 def followed_by(first: Plan, second: Plan) -> Plan:
@@ -106,7 +117,7 @@ def merged(
     return tuple(word), times
 
 
-def costliest_first(plan: Plan, rates: Array) -> Plan:
+def costliest_first(plan: Plan, problem: Problem) -> Plan:
     """A plan whose trims that commute are ordered by falling cost per second, rest last.
 
     The order of trims that share a centre, or are all straight, does not change where they lead.
@@ -120,7 +131,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
         return plan
     order: list[int] = []
     block: list[int] = []
-    costly: list[float] = (-rates).tolist()
+    costly: list[float] = (-problem.rates_of(plan)).tolist()
     for k in moving:
         if not all(commute(twists[j], twists[k]) for j in block):  # a climb commutes with both
             order += block if len(block) == 1 else sorted(block, key=costly.__getitem__)
@@ -150,6 +161,8 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
     )
     if not bracket:
         return True
+    if bracket > 1e-12 * FASTEST * FASTEST:  # no trim is faster
+        return False
     return bool(bracket <= 1e-12 * (max(map(abs, one)) * max(map(abs, other))))
 
 

@@ -87,6 +87,8 @@ class Situation:
         self.bound = 0.0  # no plan costs less, as is known before a search
         self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
         self.off_state = False  # whether another reduced state was measured than the plan says
+        self.size = 1.0 + max(map(abs, here.start.tolist()))  # [m or rad] rounding grows with it
+        self.accumulated = 0.0 if last is None else last.accumulated_cost + last.applied_cost
         if last is not None:
             off = max(apart(last.plan.pose_at(last.time + passed), here.start))
             self.off_plan = 0.0 if off <= EXACT * self.size else off
@@ -129,12 +131,6 @@ class Situation:
         )
         back = leg.trim is after.trims[0]
         self.rest, self.busy = joined(begun, after) if back else begun, leg.maneuver.duration
-
-    @cached_property
-    def size(self) -> float:
-        """The size [m or rad] that errors of rounding grow with."""
-        numbers: list[float] = self.here.start.tolist()
-        return 1.0 + max(map(abs, numbers))
 
     @cached_property
     def head(self) -> Plan | None:
@@ -298,14 +294,12 @@ class Situation:
     def best(self, kept: StepPlan | None, found: Iterable[StepPlan]) -> StepPlan | None:
         """The cheapest; of equal ones, that which costs most at first; of these, the known word."""
         everything = [*found] if kept is None else [kept, *found]
-        if not everything:
-            return None
+        if len(everything) < 2:
+            self.is_sole = bool(found or (kept and not self.settings.margin))
+            return everything[0] if everything else None
         least = min(one.cost for one in everything)
-        if (
-            kept is not None
-            and least >= kept.cost - self.settings.margin
-            and self.settings.margin > 0.0
-        ):
+        margin = self.settings.margin
+        if kept is not None and least >= kept.cost - margin and margin > 0.0:
             self.exhaustive = self.exhaustive and least == kept.cost
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]

@@ -195,7 +195,8 @@ class StepSearch:
                 f"no plan was found that takes at most {limit:g} s; the one applied takes "
                 f"{lasting:.6g} s",
             )
-        return self._known_free(replace(best, shifted_value=None if kept is None else kept.cost))
+        best.shifted_value = None if kept is None else kept.cost
+        return self._known_free(best)
 
     def is_safe(self, plan: Plan) -> bool:
         """Whether a plan stays inside the bounds, is free, and can be followed by a free motion."""
@@ -220,8 +221,8 @@ class StepSearch:
         if here.via:
             return None
         goals = here.goals if now.may_rest else ()
-        exact = (n for n, goal in enumerate(goals) if max(goal.off(here.start)) <= EXACT)
-        index = next(exact, None)
+        off = [goal.off(here.start) for goal in goals]
+        index = next((n for n, one in enumerate(off) if max(one) <= EXACT), None)
         if index is None and now.settings.hold:
             index = next((n for n, goal in enumerate(goals) if within(here.start, goal)), None)
             held = None if index is None else holding(here, now.settings, index)

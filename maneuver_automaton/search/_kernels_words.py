@@ -152,8 +152,14 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     most = 1
     if problem.terms.more_turns == 1 and time_left(problem) < np.inf:
         most += math.floor(time_left(problem) * fastest / full)
+    # Without other conditions each trim is the only one of its subgroup, and goes on in time.
+    alone_1, alone_2 = m == 0, m == 0 and rank == 2
     for turns_1 in range(-most if w_1 != 0.0 else 0, (most if w_1 != 0.0 else 0) + 1):
+        if alone_1 and (blocks[0] + full * turns_1) * (w_1 if w_1 != 0.0 else 1.0) < 0.0:
+            continue
         for turns_2 in range(-most if w_2 != 0.0 else 0, (most if w_2 != 0.0 else 0) + 1):
+            if alone_2 and (blocks[1] + full * turns_2) * (w_2 if w_2 != 0.0 else 1.0) < 0.0:
+                continue
             matrix = np.zeros((rank + m, n))
             rhs = np.empty(rank + m)
             rhs[0] = blocks[0] + full * turns_1
@@ -461,10 +467,10 @@ def scan_all_words(
     In one or two ways to meet the time, each with its greatest number of moving trims, 0 for a way
     that is none, and with a lower bound of what its words cost. Shorter words come first;
     `portions` says how many words, of three trims and of four, are scanned before the solutions of
-    some lower the upper bound of the others. Where `not_first` is a trim, only words of `most`
-    trims that do not begin with it are scanned.
+    some lower the upper bound of the others. Where `not_first` is a trim, only words of the first
+    way's most moving trims that do not begin with it are scanned, and longer ones.
     """
-    for n in range(1 if not_first < 0 else most, most + 1):
+    for n in range(1 if not_first < 0 else most_moving[0], most + 1):
         if n <= most_moving[0] and not at_least[0] > tied_to_best(found, tie):
             scan_mode(one, links_of_one, candidates, found, n, tail, portions, most, tie, not_first)
         if n <= most_moving[1] and not at_least[1] > tied_to_best(found, tie):

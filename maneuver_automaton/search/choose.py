@@ -45,8 +45,7 @@ def load_search(problem: Problem) -> None:
     if problem.horizon.min_coast > 0.0:
         load_kernels("times")
         return
-    affordable = all(_affordable(problem, goal) for goal in problem.goals)
-    if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
+    if all(_suits_words(problem, goal) for goal in problem.goals):
         load_kernels("words")
         if len(problem.automaton) > LARGE:
             library = moving_trims(problem.automaton, problem.cost)
@@ -88,7 +87,7 @@ def search_goal(
     words = functools.partial(
         search_words, goal=goal, alternatives=alternatives, budget=budget, ties=ties
     )
-    if method == "words" or (method == "auto" and _affordable(problem, goal)):
+    if _suits_words(problem, goal):
         return [words(problem, upper_bound=upper_bound, not_first=not_first)]
     results = [
         search_insertion(
@@ -114,6 +113,14 @@ def search_goal(
     return results
 
 
+def _suits_words(problem: Problem, goal: Goal) -> bool:
+    """Whether all words are searched: because that is asked for, or affordable."""
+    search, most, tail = problem.search, problem.horizon.max_trims, int(goal.free_heading)
+    if search.method != "auto":
+        return search.method == "words"
+    return _affordable(problem.automaton, most, tail, search.max_expansions)
+
+
 @kept_by_first
 def _seconds(automaton: Automaton, most: int, tail: int) -> float:
     """How long a search of all words of up to `most` trims, and of a `tail`, may take [s]."""
@@ -121,15 +128,14 @@ def _seconds(automaton: Automaton, most: int, tail: int) -> float:
     return math.fsum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
 
 
-def _affordable(problem: Problem, goal: Goal) -> bool:
+@kept_by_first
+def _affordable(automaton: Automaton, most: int | None, tail: int, limit: int | None) -> bool:
     """Whether every admitted word can be searched in a moment, and within the expansions."""
-    most, limit = problem.horizon.max_trims, problem.search.max_expansions
-    if most is None or most > MOST_TRIMS - int(goal.free_heading):
+    if most is None or most > MOST_TRIMS - tail:
         return False
-    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
+    moving = int(automaton.body_velocities.any(axis=1).sum())
     words = sum(moving * (moving - 1) ** n for n in range(most))
-    quick = _seconds(problem.automaton, most, int(goal.free_heading)) <= AFFORDABLE
-    return quick and (limit is None or words <= limit)
+    return _seconds(automaton, most, tail) <= AFFORDABLE and (limit is None or words <= limit)
 
 
 MOST_LASTING = 4  # moving trims of a word

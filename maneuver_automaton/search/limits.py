@@ -129,7 +129,7 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
         "distance": max((way * price for way, price in ways if way > 0.0), default=0.0),
         "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
     }
-    radius = least_radius(library.twists) if problem.automaton.is_kinematic else 0.0
+    radius = prices.least_radius
     if radius > 0.0 and not (goal.free_heading or goal.tolerance_m or goal.tolerance_rad):
         length = float(reeds_shepp_length(relative[:3], radius=radius))
         bounds["shortest"] = length * (1.0 - ALIKE) * prices.per_metre_level
@@ -162,6 +162,15 @@ def sole_bound(problem: Problem, goal: Goal) -> float:
         turn * prices.per_radian if prices.one_per_radian else 0.0,
     )
     return bound + (library.rest_rate * limit if limit is not None else 0.0)
+
+
+def busy_bound(problem: Problem, at_rest: float) -> float:
+    """Cost of plans that rest less than `at_rest` [s] of a fixed time, at least; inf if free."""
+    library, limit = moving_trims(problem.automaton, problem.cost), problem.horizon.time
+    prices = _prices(problem.automaton, problem.cost, True)
+    if limit is None or library.rest is None or library.rest_rate or prices is None:
+        return math.inf if limit is None else 0.0
+    return prices.per_second * (limit - at_rest)
 
 
 def three_are_enough(problem: Problem) -> bool:
@@ -256,6 +265,7 @@ class _LeastPrices:
     per_square: float  # per (m/s)^2 + (rad/s)^2 and second
     one_per_metre: bool  # whether one trim alone has the best price
     one_per_radian: bool
+    least_radius: float  # [m] of a turn, 0 where shortest paths say nothing
 
 
 @kept_by_first
@@ -281,6 +291,7 @@ def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _LeastPrices |
             per_square=float(np.min(rates / squares)),
             one_per_metre=_is_alone(metre),
             one_per_radian=_is_alone(radian),
+            least_radius=least_radius(library.twists) if automaton.is_kinematic else 0.0,
         )
 
 

@@ -100,11 +100,11 @@ def scan_linked_words(
         setup.as_search(),
         min(most, problem.horizon.max_trims or most),
         None if later else alternatives,
-        upper_bound=upper_bound * (1.0 + SLACK * later) + TIE,
         nodes=NODES,
         spare=pads,
         slack=math.inf if everything else SLACK,
     )
+    scan.begin(scan.setup, upper_bound=upper_bound * (1.0 + SLACK * later) + TIE)
     most_words = None if expansions is None else WORDS_AN_EXPANSION * expansions
     finished = scan.run(budget, most_words)
     found = _made_good(

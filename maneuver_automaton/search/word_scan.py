@@ -6,15 +6,17 @@ Words with transitions are scanned as they are seen from before them; see `_kern
 from __future__ import annotations
 
 import functools
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import called_again
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import terms_of
@@ -33,7 +35,7 @@ from maneuver_automaton.search._kernels_problem import (
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import Columns, SearchSetup, columns
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.library import FULL_TURN, MovingTrims, Transitions
+from maneuver_automaton.words.library import FULL_TURN, MovingTrims
 from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 4  # trims of one word, the free turn among them: three in closed form, one scanned
@@ -56,14 +58,15 @@ class Mode:
 
     kernel_problem: KernelProblem  # its trims and conditions, its transitions
     most_moving: int
-    at_least: float = -math.inf  # cost of the whole time at the cheapest trim, where it is fixed
+    at_least: float  # cost of the whole time at the cheapest trim, where it is fixed
+    seconds: float  # that a whole scan may take; inf where words are too long for one
 
 
 class WordScan:
     """A scan of all words of up to `most` trims: its buffers, and what it has found.
 
-    Where `not_first` is a trim of the automaton, fewer words need to be scanned: those of `most`
-    trims that do not begin with it.
+    Where `not_first` is a trim of the automaton, fewer words need to be scanned: of the longest
+    ones those that do not begin with it.
     """
 
     def __init__(
@@ -76,29 +79,51 @@ class WordScan:
         nodes: int = NODES,
         spare: bool = False,
         slack: float = math.inf,
-        upper_bound: float = math.inf,
-        not_first: int | None = None,
     ) -> None:
-        self.problem = problem
+        self.automaton, self.cost, self.horizon = problem.automaton, problem.cost, problem.horizon
         self.setup = setup
-        self.most = most
-        self.nodes = nodes
-        self.spare = spare
-        self.slack = slack
+        self.most, self.nodes, self.spare, self.slack = most, nodes, spare, slack
         self.tables = tables(setup.library, free_heading=setup.free_heading)
-        trims = setup.library.trims.tolist()
-        self.not_first = trims.index(not_first) if not_first in trims else -1  # a row of the search
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = terms_of(problem.cost) is None
-        if self.own_prices:
-            alternatives = None
-        self.pruned = alternatives is not None or upper_bound < math.inf
-        self.asked = None if alternatives is None else alternatives + 1
-        self.upper_bound = upper_bound
-        self._begin(CAPACITY)
+        self.asked = None if alternatives is None or self.own_prices else alternatives + 1
+        limit = self.horizon.max_time if self.horizon.time is None else self.horizon.time
+        self.limit = math.inf if limit is None else limit  # [s]
+        self.idle: list[WordScan] = []  # where it is put once its results are read
+        self.upper_bound = math.inf
+        self.goal, self.fixed = np.empty(4), np.zeros(9)  # of all modes
+        self.reaches = np.minimum(self.tables.turns, self.limit)
+        self.modes = tuple(self._modes())
+        self._make_room(CAPACITY)
+        self.begin(setup)
 
-    def _begin(self, capacity: int) -> None:
-        """Begin to scan, with room for so many solutions."""
+    def begin(
+        self, setup: SearchSetup, *, upper_bound: float = math.inf, not_first: int | None = None
+    ) -> None:
+        """Begin with another goal, in the memory of the last scan."""
+        self.setup = setup
+        self.not_first = -1 if not_first is None else int(self.tables.columns.number_of[not_first])
+        self.pruned = self.asked is not None or upper_bound < math.inf
+        self.upper_bound = upper_bound
+        self.goal[:] = setup.goal
+        x, y, heading, rise = setup.goal.tolist()
+        distance, turn = math.hypot(x, y), abs(math.remainder(heading, FULL_TURN))
+        self.fixed[:] = 0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y
+        # longest time of interest: a full turn, or a path well beyond the goal
+        length = max(2.0 * (distance + 4.0 * self.tables.largest) + abs(rise), 1e-3)
+        straight = length / self.tables.fastest
+        self.reaches[self.tables.straights] = np.minimum(straight, self.limit)
+        if setup.climbs:
+            for mode in self.modes:
+                mode.kernel_problem[0].library.targets[0] = rise
+        if len(self.found.costs) > CAPACITY:
+            self._make_room(CAPACITY)
+        self.candidates.counter[:] = 0
+        self.found.counter[0] = 0
+        self.found.best[:] = upper_bound
+
+    def _make_room(self, capacity: int) -> None:
+        """Make room for so many solutions."""
         width = MOST_TRIMS + 1
         self.candidates = Candidates(
             words=np.empty((CAPACITY, width), dtype=np.int64),
@@ -116,6 +141,7 @@ class WordScan:
             counter=np.zeros(1, dtype=np.int64),
             best=np.full(self.asked or capacity, self.upper_bound),
         )
+        self.calls: dict[int, tuple[Any, ...]] = {}  # arguments, by the number of modes at once
 
     @property
     def n_found(self) -> int:
@@ -137,27 +163,14 @@ class WordScan:
 
         Where there is no room for all solutions they are scanned again, if there is time.
         """
-        modes = list(self.modes())
+        modes = [one for one in self.modes if one.at_least <= tied(float(self.found.best[-1]))]
         tail = 1 if self.setup.free_heading else 0
         if max_words is None:
-            at_once = [mode for mode in modes if self._takes_a_moment(mode, budget)]
+            moment = min(MOMENT, AT_ONCE * budget.left)  # in which nobody asks the clock
+            at_once = [mode for mode in modes if mode.seconds <= moment]
             modes = [mode for mode in modes if mode not in at_once]
             if at_once:  # in one call: calls take longer than a scan of few words
-                both = (*at_once, at_once[0])[:2]  # in place of a second way to meet the time
-                limits = [min(mode.most_moving, self.most) for mode in at_once]
-                _kernels_words.scan_all_words(
-                    *both[0].kernel_problem,
-                    *both[1].kernel_problem,
-                    np.array([*limits, 0][:2]),
-                    np.array([mode.at_least for mode in both]),
-                    self.candidates,
-                    self.found,
-                    tail,
-                    PORTIONS_AT_ONCE,
-                    self.most,
-                    TIE,
-                    self.not_first,
-                )
+                self._scan_at_once(at_once, tail)
         finished = all(
             self._scan_all(flat, chunk, mode, n, budget, max_words)
             for n in range(1, self.most + 1)
@@ -169,18 +182,30 @@ class WordScan:
             return finished
         if budget.is_over:
             return False
-        self._begin(2 * self.n_found)
+        self._make_room(2 * self.n_found)
         return self.run(budget, max_words)
 
-    def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
-        """Whether a whole scan is so short that nobody asks the clock meanwhile."""
-        tail = 1 if self.setup.free_heading else 0
-        if self.most + tail > MOST_TRIMS:
-            return False
-        each = SECONDS_PER_WORD if mode.kernel_problem[0].library.targets.size else SECONDS_IF_FREE
-        numbers = range(1, min(self.most, mode.most_moving) + 1)
-        seconds = math.fsum(len(self.setup.library.trims) ** n * each[n + tail] for n in numbers)
-        return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
+    def _scan_at_once(self, modes: list[Mode], tail: int) -> None:
+        """Scan all words of one or two modes, whose arrays stay what they are at every call."""
+        scan: Callable[..., None] = _kernels_words.scan_all_words
+        if len(modes) in self.calls:
+            scan = called_again(scan)
+        else:
+            both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
+            limits = [min(mode.most_moving, self.most) for mode in modes]
+            self.calls[len(modes)] = (
+                *both[0].kernel_problem,
+                *both[1].kernel_problem,
+                np.array([*limits, 0][:2]),
+                np.array([mode.at_least for mode in both]),
+                self.candidates,
+                self.found,
+                tail,
+                PORTIONS_AT_ONCE,
+                self.most,
+                TIE,
+            )
+        scan(*self.calls[len(modes)], self.not_first)
 
     def _scan_all(
         self, flat: bool, chunk: int, mode: Mode, n: int, budget: Budget, max_words: int | None
@@ -216,79 +241,79 @@ class WordScan:
         if n >= 3:
             yield False, few if n == 3 else 50
 
-    def modes(self) -> Iterator[Mode]:
-        """A fixed time padded by rest; free; a fixed or longest time met exactly.
-
-        The last one not where the cheapest trim for so long is too costly.
-        """
-        horizon, setup = self.problem.horizon, self.setup
+    def _modes(self) -> Iterator[Mode]:
+        """A fixed time padded by rest; free; a fixed or longest time met exactly."""
+        horizon, setup = self.horizon, self.setup
         longest = MOST_TRIMS - int(setup.free_heading)
-        exact = horizon.time if horizon.time is not None else horizon.max_time
         if horizon.time is None:
-            kernel_problem = self._kernel_problem(horizon.max_time, pad=False, fixed=False)
-            yield Mode(kernel_problem, min(self.most, longest))
+            yield self._mode(min(self.most, longest))
         elif setup.library.rest is not None:
             # of `max_trims`, rest is one, unless the rest of the time happens to be none
-            kernel_problem = self._kernel_problem(horizon.time, pad=True, fixed=False)
-            yield Mode(kernel_problem, min(self.most - 1, longest))
-        if exact is not None:
-            most = min(self.most, 2 if self.spare else longest)
-            at_least = exact * self.tables.least_rate if len(setup.library.rates) else math.inf
-            if at_least > tied(float(self.found.best[-1])):
-                return
-            yield Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
+            yield self._mode(min(self.most - 1, longest), pad=True)
+        if self.limit < math.inf:
+            yield self._mode(min(self.most, 2 if self.spare else longest), fixed=True)
 
-    def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> KernelProblem:
+    def _mode(self, most_moving: int, *, pad: bool = False, fixed: bool = False) -> Mode:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
-        setup, terms, tables = self.setup, terms_of(self.problem.cost), self.tables
-        rest_rate = setup.library.rest_rate if pad else 0.0
-        ends = setup.start_class, setup.goal_class
-        same = _same_for_all(tables, setup.transitions, rest_rate, setup.climbs, fixed, *ends)
-        targets = [float(setup.goal[3])] if setup.climbs else []
-        if fixed and limit is not None:
-            targets.append(limit)
-        linked = len(same.links.cost) > 1
-        x, y, heading, _ = setup.goal.tolist()
-        distance = math.hypot(x, y)
-        turn = abs(math.remainder(heading, FULL_TURN))
-        bounded = math.inf if limit is None else limit
-        fixed_time = self.problem.horizon.time is not None
+        setup, terms, tables, limit = self.setup, terms_of(self.cost), self.tables, self.limit
+        known, kept, rest_rate = setup.transitions, tables.columns, setup.library.rest_rate * pad
+        height, rise = known.displacement[..., 3], float(setup.goal[3])
+        met = [(kept.twists[:, 3], height, rise)] if setup.climbs else []
+        met += [(kept.weights, known.time, limit)] if fixed else []
+        links = Links(
+            class_of=known.class_of[kept.trims],
+            start=setup.start_class,
+            goal=setup.goal_class,
+            displacement=np.array(known.displacement),
+            cost=known.cost - rest_rate * known.time if rest_rate else np.array(known.cost),
+            time=np.array(known.time),
+            gains=np.array([gain for _, gain, _ in met]).reshape(len(met), *known.time.shape),
+        )
+        rates = kept.rates - rest_rate * kept.weights if rest_rate else kept.rates
+        prices = np.full(tables.paces.shape, np.inf)  # where a trim makes no metre, or no radian
+        np.divide(rates[:, None], tables.paces, out=prices, where=tables.paces > 0.0)
+        gears = terms.direction_change if terms and len(links.cost) == 1 else 0.0
         problem = WordProblem(
             library=TimesProblem(
-                twists=tables.columns.twists,
-                rates=same.rates,
-                rows=same.rows,
-                goal=np.array(setup.goal),
-                targets=np.array(targets, dtype=np.float64),
+                twists=kept.twists,
+                rates=rates,
+                rows=np.array([row for row, *_ in met]).reshape(len(met), len(rates)),
+                goal=self.goal,
+                targets=np.array([target for *_, target in met], dtype=np.float64),
             ),
             trims=Alphabet(
-                numbers=same.trims,
-                prices=same.per_unit,
+                numbers=np.arange(len(rates)),
+                prices=prices,
                 periods=tables.periods,
-                reaches=tables.reaches(setup, most=bounded),
+                reaches=self.reaches,
                 parallel=tables.parallel,
-                weights=tables.columns.weights,
+                weights=kept.weights,
             ),
-            size=same.size,
-            fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y]),
+            size=np.zeros(1, dtype=np.int64),
+            fixed=self.fixed,
             terms=WordTerms(
-                time_limit=float(bounded),
+                time_limit=float(limit),
                 pad=int(pad),
-                pad_cost=float(setup.library.rest_rate * bounded) if pad else 0.0,
+                pad_cost=float(setup.library.rest_rate * limit) if pad else 0.0,
                 switch=terms.switch if terms else 0.0,
-                direction_change=0.0 if linked or not terms else terms.direction_change,
-                more_turns=int((fixed_time and not self.spare) or setup.climbs),
+                direction_change=gears,
+                more_turns=int((self.horizon.time is not None and not self.spare) or setup.climbs),
                 shortest=setup.shortest,
             ),
             scan=ScanSettings(nodes=self.nodes, slack=self.slack, tolerance=TOLERANCE),
-            tail=len(same.rates) - 1 if setup.free_heading else -1,
+            tail=len(rates) - 1 if setup.free_heading else -1,
         )
-        return problem, same.links
+        tail, trims = int(setup.free_heading), len(setup.library.trims)
+        each, seconds = SECONDS_PER_WORD if met else SECONDS_IF_FREE, math.inf
+        if self.most + tail <= MOST_TRIMS:
+            numbers = range(1, min(self.most, most_moving) + 1)
+            seconds = math.fsum(trims**n * each[n + tail] for n in numbers)
+        at_least = (limit * tables.least_rate if trims else math.inf) if fixed else -math.inf
+        return Mode((problem, links), most_moving, at_least, seconds)
 
     def solutions(self) -> Iterator[Word]:
         """Words found by rising cost, rest last; if pruned, those asked for, and ties."""
-        for word, times, cost in self._rows():
-            yield self._padded(word, times, cost)
+        return itertools.starmap(self._padded, self._rows())
 
     def timed(self) -> Iterator[TimedWord]:
         """The moving trims of what was found, by the automaton's numbers, and their times."""
@@ -303,19 +328,47 @@ class WordScan:
             if self.pruned and costs[k] > costliest:
                 break
             numbers = self.found.words[k]
-            size = sum(number >= 0 for number in numbers.tolist()) - int(self.setup.free_heading)
+            size = numbers.tolist().index(-1) - int(self.setup.free_heading)
             yield self.setup.library.trims[numbers[:size]], self.found.times[k, :size], costs[k]
 
     def _padded(self, word: IntArray, times: Array, cost: float) -> Word:
-        time_s = self.problem.horizon.time
+        time_s, numbers, lasting = self.horizon.time, word.tolist(), times.tolist()
         if time_s is not None and self.setup.library.rest is not None:
-            left = time_s - float(times.sum())
+            left = time_s - float(np.add.reduce(times))
             if left > 1e-9:
-                word = np.array([*word.tolist(), self.setup.library.rest], dtype=np.int64)
-                times = np.array([*times.tolist(), left])
+                numbers.append(self.setup.library.rest)
+                lasting.append(left)
         if self.own_prices:
-            cost += self.problem.cost.switching(self.problem.automaton.body_velocities[word])
-        return Word(trims=word, durations=times, cost=cost)
+            cost += self.cost.switching(self.automaton.body_velocities[numbers])
+        return Word(trims=np.array(numbers, dtype=np.int64), durations=np.array(lasting), cost=cost)
+
+
+@kept_by_first
+def _idle(library: MovingTrims, *asked: Hashable) -> list[WordScan]:
+    return []
+
+
+def scan_of(
+    problem: Problem,
+    setup: SearchSetup,
+    most: int,
+    alternatives: int | None,
+    *,
+    nodes: int = NODES,
+    spare: bool = False,
+) -> WordScan:
+    """A scan that begins; if there is one, in the memory of one that differs in the goal alone.
+
+    For trims that switch at will. Once its results are read, it goes back to the `idle` ones.
+    """
+    asked = problem.cost, problem.horizon, most, alternatives, nodes, spare
+    idle = _idle(setup.library, *asked, setup.free_heading, setup.climbs)
+    try:
+        job = idle.pop()
+    except IndexError:  # asked for before, another thread might take the last one
+        job = WordScan(problem, setup, most, alternatives, nodes=nodes, spare=spare)
+    job.idle = idle
+    return job
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -331,69 +384,6 @@ class _Tables:
     straights: IntArray  # trims that move and do not turn
     fastest: Array  # [m/s] of these on the way to a goal, in the plane or upwards
     largest: float  # [m] radius of a turn
-
-    def reaches(self, setup: SearchSetup, *, most: float) -> Array:
-        """Longest time of interest per trim: a full turn, or a path well beyond the goal.
-
-        Not more than `most` [s].
-        """
-        place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
-        length = max(2.0 * (place + 4.0 * self.largest) + abs(float(setup.goal[3])), 1e-3)
-        reaches = self.turns.copy()
-        reaches[self.straights] = length / self.fastest
-        return reaches if most == math.inf else np.minimum(reaches, most)
-
-
-class _SameForAll(NamedTuple):
-    """What all searches of a library with some conditions share, for every start and goal."""
-
-    trims: IntArray  # (M,)
-    size: IntArray  # (1,)
-    rates: Array  # (M,)
-    per_unit: Array  # (M, 2)
-    rows: Array  # (m, M)
-    links: Links
-
-
-@kept_by_first
-def _same_for_all(
-    tables: _Tables,
-    known: Transitions,
-    rest_rate: float,
-    climbs: bool,
-    fixed: bool,
-    start: int,
-    goal: int,
-) -> _SameForAll:
-    """Trims above a rest of this rate, linear conditions, transitions; kernels only read them."""
-    rates, per_unit = _rates_above(tables, rest_rate)
-    met = [(tables.columns.twists[:, 3], known.displacement[..., 3])] if climbs else []
-    met += [(tables.columns.weights, known.time)] if fixed else []
-    links = Links(
-        class_of=known.class_of[tables.columns.trims],
-        start=start,
-        goal=goal,
-        displacement=np.array(known.displacement),
-        cost=known.cost - rest_rate * known.time if rest_rate else np.array(known.cost),
-        time=np.array(known.time),
-        gains=np.array([gain for _, gain in met]).reshape(len(met), *known.time.shape),
-    )
-    return _SameForAll(
-        trims=np.arange(len(rates)),
-        size=np.zeros(1, dtype=np.int64),
-        rates=rates,
-        per_unit=per_unit,
-        rows=np.array([row for row, _ in met]).reshape(len(met), len(rates)),
-        links=links,
-    )
-
-
-@kept_by_first
-def _rates_above(tables: _Tables, rest: float) -> tuple[Array, Array]:
-    """Cost per second (M,) less a rest's; and (M, 2) per metre and per radian, inf for none."""
-    rates = tables.columns.rates - rest * tables.columns.weights if rest else tables.columns.rates
-    none = np.full(tables.paces.shape, np.inf)
-    return rates, np.divide(rates[:, None], tables.paces, out=none, where=tables.paces > 0.0)
 
 
 @kept_by_first

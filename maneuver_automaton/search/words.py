@@ -11,7 +11,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchResult, SearchStatus, in_order, tied
 from maneuver_automaton.search.setup import SearchSetup, search_setup
-from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan
+from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan, scan_of
 from maneuver_automaton.words.word import Word
 
 MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
@@ -88,15 +88,8 @@ def search_words(
         )
     if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         return resting(problem, setup)
-    job = WordScan(
-        problem,
-        setup,
-        most,
-        alternatives,
-        nodes=nodes,
-        upper_bound=upper_bound,
-        not_first=not_first,
-    )
+    job = scan_of(problem, setup, most, alternatives, nodes=nodes)
+    job.begin(setup, upper_bound=upper_bound, not_first=not_first)
     finished = job.run(budget, problem.search.max_expansions)
     solutions = tuple(in_order(_handed_over(job, budget)))
     if alternatives is not None and len(solutions) > alternatives + 1:
@@ -105,13 +98,11 @@ def search_words(
         solutions = asked + tuple(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
+    job.idle.append(job)
     exhaustive = finished and most <= longest  # no words of more moving trims are admitted
-    if solutions:
-        status = SearchStatus.FOUND
-    else:
-        status = SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET
+    none = SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET
     return SearchResult(
-        status=status,
+        status=SearchStatus.FOUND if solutions else none,
         solutions=solutions,
         complete=alternatives is None and exhaustive and upper_bound == math.inf,
         exhaustive=exhaustive and problem.horizon.max_trims is not None,
@@ -135,9 +126,10 @@ def search_setup_words(
     padded = problem.horizon.time is not None and setup.library.rest is not None
     exact = problem.horizon.time is not None and not padded
     most = conditions + int(exact)  # as far as so many are scanned
-    job = WordScan(
+    job = scan_of(
         problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
     )
+    job.begin(setup)
     job.run(budget, None)
     cheapest: list[Word] = []
     for word in _handed_over(job, budget):  # by rising cost, but for a user's own prices
@@ -145,6 +137,7 @@ def search_setup_words(
         if enough and word.cost > tied(cheapest[alternatives].cost):
             break
         cheapest.append(word)
+    job.idle.append(job)
     return list(in_order(cheapest))[: alternatives + 1]
 
 
@@ -158,17 +151,10 @@ def _handed_over(job: WordScan, budget: Budget) -> Iterator[Word]:
 
 def resting(problem: Problem, setup: SearchSetup) -> SearchResult:
     """Start equal to goal: an empty word, or the whole of a fixed time at rest."""
-    time_s = problem.horizon.time
-    if time_s is None or setup.library.rest is None:
-        empty = Word(trims=np.zeros(0, dtype=np.int64), durations=np.zeros(0), cost=0.0)
-        return SearchResult(
-            status=SearchStatus.FOUND, solutions=(empty,), complete=False, exhaustive=True
-        )
-    rest = Word(
-        trims=np.array([setup.library.rest]),
-        durations=np.array([time_s]),
-        cost=setup.library.rest_rate * time_s,
-    )
-    return SearchResult(
-        status=SearchStatus.FOUND, solutions=(rest,), complete=False, exhaustive=True
-    )
+    time_s, rest, cost = problem.horizon.time, setup.library.rest, 0.0
+    trims, times = np.zeros(0, dtype=np.int64), np.zeros(0)
+    if time_s is not None and rest is not None:
+        trims, times = np.array([rest]), np.array([time_s])
+        cost = setup.library.rest_rate * time_s
+    word = Word(trims=trims, durations=times, cost=cost)
+    return SearchResult(status=SearchStatus.FOUND, solutions=(word,), exhaustive=True)

@@ -41,9 +41,8 @@ class Word:
     def __post_init__(self) -> None:
         freeze(self, "durations")
         _freeze_numbers(self, "trims", self.trims)
-        held = self.transitions
-        n = max(0, self.trims.size - 1)
-        _freeze_numbers(self, "transitions", [SWITCH] * n if held is None else held)
+        held, n = self.transitions, self.trims.size
+        _freeze_numbers(self, "transitions", [SWITCH] * (n - 1) if held is None else held)
 
     @property
     def duration(self) -> float:
@@ -187,9 +186,10 @@ def is_word_of(automaton: Automaton, plan: Plan, word: Word) -> bool:
     """Whether a word of trims that switch at will is that of a plan, with the same times."""
     if word.trims.size != len(plan.trims) or plan.maneuvers:
         return False
+    times = zip(plan.durations.tolist(), word.durations.tolist(), strict=True)
     pairs = zip(plan.trims, word.trims.tolist(), strict=True)
     same = all(trim is automaton.trims[k] for trim, k in pairs)
-    return same and bool(np.abs(plan.durations - word.durations).max(initial=0.0) <= SAME_TIME)
+    return same and all(abs(a - b) <= SAME_TIME for a, b in times)
 
 
 def displacements_of(automaton: Automaton, transitions: Sequence[int] | IntArray) -> Array:

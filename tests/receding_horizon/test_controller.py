@@ -10,11 +10,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Horizon, Problem
-from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
+from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, simulate, within
 from maneuver_automaton.receding_horizon.rest_of_plan import missed
 from tests.receding_horizon.loops import AHEAD, NEAR, parking_loop, straight
 from tests.search.cases import (
     REEDS_SHEPP,
+    SLOW_AND_FAST,
     TABLE_2,
     robot,
     without_rest,
@@ -270,6 +271,22 @@ class TestSwitches:
             spent += step.applied_cost
             _, step = loop.step(step.predicted)
         assert spent <= first.value + 1e-9
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        parking_loop(start=(-0.5, 1.2, 0.7)),  # a word that moves all the time costs too much
+        parking_loop(  # it may cost less than a quick one
+            SLOW_AND_FAST, start=(-0.1, 0.9, 0.7), horizon=Horizon(time=5.0, max_trims=4)
+        ),
+    ],
+    ids=["table 2", "slow and fast"],
+)
+def test_no_word_is_left_out_that_would_be_cheaper(problem):
+    for step in simulate(problem, step=1.0, steps=6).steps:
+        _, alone = controller(replace(problem, start=step.pose), step=1.0).step(step.pose)
+        assert step.value == pytest.approx(alone.value, rel=1e-9)
 
 
 class TestLowerBound:

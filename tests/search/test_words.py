@@ -329,6 +329,20 @@ def test_a_moved_problem_has_the_same_words(problem):
         assert_same_solutions(here, search(problem.moved(by), alternatives=1))
 
 
+@pytest.mark.parametrize("options", [{}, {"alternatives": None}], ids=["best", "all"])
+@pytest.mark.parametrize("changed", [{}, {"cost": MINIMUM_TIME, "time": None}], ids=["T", "free"])
+def test_one_after_the_other_goals_have_the_words_that_they_have_alone(changed, options):
+    problem = parking(TABLE_2, **changed)
+    for start in ([0.0, 1.0, 0.0], [1.0, 0.2, 2.0], [0.0, 0.0, 0.4], [0.0, 1.0, 0.0]):
+        again = search(replace(problem, start=np.array(start)), **options)
+        alone = search(replace(parking(TABLE_2, **changed), start=np.array(start)), **options)
+        assert [one.trims.tolist() for one in again.solutions] == [
+            one.trims.tolist() for one in alone.solutions
+        ]
+        for one, other in zip(again.solutions, alone.solutions, strict=True):
+            assert (one.durations == other.durations).all()
+
+
 @compiled_only
 @pytest.mark.parametrize("start", [[0.3, 1.2, 0.4], [-2.1, 0.57, 2.9]])
 def test_a_moved_problem_has_the_same_alternatives(start):
