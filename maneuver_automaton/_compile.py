@@ -1,7 +1,7 @@
 """The `kernel` decorators: compile a loop once, and never run a stale one.
 
-Compiled code is kept on disk (`_kernel_folders`); where nothing can be written, kernels work
-without. numba is imported when the first kernel is called: what calls none does not wait for it.
+Compiled code is kept on disk (`_kernel_folders`), and runs without numba (`_kernel_files`): that is
+imported where a kernel has to be compiled. Where nothing can be written, kernels work without.
 """
 
 from __future__ import annotations
@@ -9,10 +9,15 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import sys
+import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from maneuver_automaton import _kernel_list
 from maneuver_automaton._cache_files import PLAINLY, say_once
+from maneuver_automaton._interrupts import compiler_works
+from maneuver_automaton._kernel_files import kinds_of, loaded
 from maneuver_automaton._kernel_folders import kernel_folder
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
@@ -26,23 +31,40 @@ class CompiledLater:
         functools.update_wrapper(self, function)
         self._function = function
         self._make = make
+        self.loaded: dict[str, Callable[..., Any]] = {}  # without numba, by kinds of arguments
+        self._run: Callable[..., Any] = self._run_without_numba
 
     @functools.cached_property
     def compiled(self) -> Callable[..., Any]:
-        """What numba makes of it."""
+        """What numba makes of it, which runs from now on."""
         _meet_numba()
-        made: Callable[..., Any] = self._make(self._function)
-        return made
+        self._run = made = self._make(self._function)
+        return cast("Callable[..., Any]", made)
 
-    @functools.cached_property
-    def only_entry(self) -> Callable[..., Any]:
-        """What numba made of it for the only types that it was called with so far."""
-        (made,) = self.overloads.values()
-        return cast("Callable[..., Any]", made.entry_point)
+    def load(self, kinds: str) -> Callable[..., Any] | None:
+        """What was compiled for arguments of some kinds, without numba; None: ask numba."""
+        with _LOADING:
+            if kinds not in self.loaded and (found := loaded(self._function, kinds)):
+                self.loaded[kinds] = found
+            return None if "numba" in sys.modules else self.loaded.get(kinds)
+
+    def load_for(self, args: tuple[Any, ...]) -> Callable[..., Any] | None:
+        """What was compiled for arguments of these types, without numba; None: ask numba."""
+        if "numba" in sys.modules:
+            return None
+        try:
+            kinds = kinds_of(args)
+        except (AttributeError, KeyError):  # what only numba can type
+            return None
+        _kernel_list.told += len(kinds)
+        return self.loaded.get(kinds) or self.load(kinds)
+
+    def _run_without_numba(self, *args: Any) -> Any:
+        return (self.load_for(args) or self.compiled)(*args)
 
     def __call__(self, *args: Any) -> Any:
         """Run it, compiled."""
-        return self.compiled(*args)
+        return self._run(*args)
 
     def __getattr__(self, name: str) -> Any:
         """What numba knows of it: its signatures, its code."""
@@ -146,6 +168,8 @@ def bound(function: Callable[..., Any], *args: Any) -> Callable[[], Any]:
     """
     if not isinstance(function, CompiledLater):
         return functools.partial(function, *args)
+    if entry := function.load_for(args):
+        return functools.partial(entry, *args)
     import numba
 
     types = tuple(map(numba.typeof, args))
@@ -159,11 +183,15 @@ def called_again(function: Kernel) -> Kernel:
 
     It does not look at them again, which takes longer than some calls.
     """
-    if not isinstance(function, CompiledLater) or len(function.overloads) != 1:
+    if not isinstance(function, CompiledLater):
         return function
-    return cast("Kernel", function.only_entry)
+    entries = list(function.loaded.values())
+    if "compiled" in vars(function):
+        entries = [one.entry_point for one in function.overloads.values()]
+    return cast("Kernel", entries[0]) if len(entries) == 1 else function
 
 
+_LOADING = threading.RLock()
 NO_COUNTS: dict[str, Any] = {"_nrt": False}
 LINKED = (0, 63), (0, 68)  # the first and the last numba whose insides `_linking` is known to fit
 
@@ -176,10 +204,19 @@ def _later(function: Kernel, make: Callable[..., Any], options: dict[str, Any]) 
 
 @functools.cache
 def _meet_numba() -> None:
-    """Tell numba how to type functions that it has not taken over yet, where others call them."""
+    """Tell numba how to type functions that it has not taken over yet, and whom to tell of work."""
+    from numba.core import event
     from numba.extending import typeof_impl
 
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            compiler_works(True)
+
+        def on_end(self, event: Any) -> None:
+            compiler_works(False)
+
     typeof_impl.register(CompiledLater, lambda value, context: typeof_impl(value.compiled, context))
+    event.register("numba:compile", Listener())
 
 
 def _pipeline(name: str) -> dict[str, Any]:

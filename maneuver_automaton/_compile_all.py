@@ -11,7 +11,6 @@ import functools
 import itertools
 import math
 import os
-import platform
 import shutil
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
+from maneuver_automaton._kernel_files import processors
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 from maneuver_automaton._kernel_list import LATER, kernel_names, later_uses, module_of
 
@@ -44,7 +44,6 @@ EVERY = "MANEUVER_AUTOMATON_COMPILE_ALL"  # set where a build is to compile ever
 LOCK = ".compiling"  # name of the lock in the folder
 STALE = 20.0  # [s] after which a lock that is touched no more is nobody's
 WORKER = "MANEUVER_AUTOMATON_COMPILES"  # set in the environment of the processes that compile
-X86_64_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "xsave")
 
 # Called again and again with the kernels that are compiled, and with all
 Report = Callable[[Sequence[str], Collection[str]], None]
@@ -173,17 +172,6 @@ def ship(package: Path) -> list[str]:
                 path.unlink()
             other.rmdir()
     return failed
-
-
-def processors() -> list[str]:
-    """Kinds of processors, as LLVM names them, that this one can stand for; the best one first."""
-    from llvmlite import binding
-
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        return ["generic"]
-    features = binding.get_host_cpu_features()
-    can = all(features.get(one, False) for one in X86_64_V3)
-    return ["x86-64-v3", "x86-64"] if can else ["x86-64"]
 
 
 def cores() -> int:

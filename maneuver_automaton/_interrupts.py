@@ -23,6 +23,7 @@ class _State:
     patient: int = 0  # blocks that end by themselves once `stopped`
     compiling: int = 0  # functions that the compiler is at work on: it asks nobody
     tells: tuple[Callable[[], None], ...] = ()  # what to call when the first signal comes
+    watches: tuple[Callable[[bool], None], ...] = ()  # what to call as the compiler begins and ends
 
 
 _STATE = _State()
@@ -106,14 +107,22 @@ def listening() -> Iterator[None]:
         _STATE.signal = None
 
 
-def compiler_began() -> None:
-    """Note that the compiler begins with a function."""
-    _STATE.compiling += 1
+@contextlib.contextmanager
+def compiler_watched(watch: Callable[[bool], None]) -> Iterator[None]:
+    """Call `watch` as the compiler starts to work inside, with True, and as it is done."""
+    before = _STATE.watches
+    _STATE.watches = (*before, watch)
+    try:
+        yield
+    finally:
+        _STATE.watches = before
 
 
-def compiler_ended() -> None:
-    """Note that the compiler is done with a function."""
-    _STATE.compiling -= 1
+def compiler_works(begins: bool) -> None:
+    """Note that the compiler begins with a function, or is done with it."""
+    _STATE.compiling += 1 if begins else -1
+    for watch in _STATE.watches:
+        watch(begins)
 
 
 def _note(number: int, _frame: FrameType | None) -> None:

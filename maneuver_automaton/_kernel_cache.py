@@ -8,34 +8,26 @@ and is read only if nobody but the user or the installer can have written it.
 from __future__ import annotations
 
 import functools
-import hashlib
+import io
 import pickle
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite.binding import add_symbol
 from numba.core.compiler import CompileResult
+from numba.core.intrinsics import INTR_MATH
 from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
-from numba.core.types.containers import BaseTuple
 
+from maneuver_automaton import _kernel_files, _kernel_list
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
-from maneuver_automaton._compile_all import compile_missing, processors
+from maneuver_automaton._compile_all import compile_missing
 from maneuver_automaton._kernel_folders import shipped_folder
-from maneuver_automaton._kernel_list import (
-    compiled_with,
-    kernel_named,
-    kernel_names,
-    later_uses,
-    signatures_of,
-)
 
-ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
-FORMAT = 3  # of the files; counts into their names
+
+_kernel_files.name_memory(_nrt_python.c_helpers)  # as numba does, which compiles the rest anew
 
 
 class KernelCache:
@@ -43,15 +35,11 @@ class KernelCache:
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         """`function` as Python has it."""
-        code = function.__code__
         self.folder, self.function = folder, function
-        self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")
+        self.name = _kernel_files.kernel_name(function)
+        _kernel_files.source_digest(function.__code__.co_filename)  # or OSError: there is none
         closed = [cell.cell_contents for cell in function.__closure__ or ()]
-        self.made_from = (
-            (FORMAT, numba.__version__, sys.version_info[:2], getattr(sys, "abiflags", "")),
-            (_source_digest(code.co_filename), code.co_firstlineno, code.co_code.hex()),
-            dumps(closed).hex() if closed else "",
-        )
+        self.closed = dumps(closed).hex() if closed else ""
 
     @property
     def cache_path(self) -> str:
@@ -60,32 +48,32 @@ class KernelCache:
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None if that is not to be had."""
-        _find_memory()
         found = self._found(signature, target_context)
         if (
             found is None
-            and _is_listed(self.name, signature)
-            and _compiled(tuple(compiled_with(self.name)))
+            and self.name in _kernel_list.kernel_names()
+            and tuple(signature) in _kernel_list.signatures_of(self.name)
+            and _compiled(tuple(_kernel_list.compiled_with(self.name)))
         ):
             found = self._found(signature, target_context)
         return found
 
     def _found(self, signature: Any, target_context: Any) -> Any:
         own = target_context.codegen().magic_tuple()
-        places = [(self.folder, own)]
-        if shipped := shipped_folder():
-            places = [(shipped, (own[0], one, "")) for one in processors()] + places
-        for folder, target in places:
+        for folder, target in _kernel_files.folders(own, self.folder):
             path = folder / self._file(signature, target)
             try:
                 content = read_checked(path, trusted=True)
                 if content is None:
                     continue
-                stated, notes, payload = pickle.loads(content)
-                if stated != signature:
+                stream = io.BytesIO(content)
+                machine, (types, notes, payload) = pickle.load(stream), pickle.load(stream)
+                if types != signature:
                     continue
+                (name, kind, names), *payload = payload
+                payload = (name, kind, (machine.code, names)), *payload
                 for name, args in notes["shares"]:  # before what calls it where it lies
-                    kernel_named(name).compile(args)  # type: ignore[attr-defined]
+                    _kernel_list.kernel_named(name).compile(args)  # type: ignore[attr-defined]
                 compiled = CompileResult._rebuild(target_context, *payload)
                 vars(compiled.library).update(notes)
                 if notes["stated"] is None:
@@ -108,37 +96,37 @@ class KernelCache:
         try:
             notes: dict[str, Any] = {"shares": [], "stated": None}
             notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
-            *payload, environments = compiled._reduce()
+            (name, kind, (code, names)), *payload, environments = compiled._reduce()
             # To load an environment imports its module, of numba's own some with all of SciPy; only
             # its constants are read.
             read = tuple(one for one in environments if one.consts)
-            write_checked(path, dumps((signature, notes, (*payload, read))))
+            payload = (name, kind, names), *payload, read
+            module, own = compiled.library._final_module, compiled.environment
+            every = [*module.functions, *module.global_variables]
+            needs = [one.name for one in every if one.is_declaration and "llvm." not in one.name]
+            if compiled.reload_init or set(read) - {own} or not hasattr(compiled.library, "shares"):
+                needs.append("numba")  # which nothing defines
+            entry = "" if notes["stated"] else compiled.fndesc.llvm_cpython_wrapper_name
+            defines = [one.name for one in every if not one.is_declaration]
+            shares = [(name, _kinds_of(args)) for name, args in notes["shares"]]
+            linked = [*needs, *INTR_MATH], shares
+            held = own.env_name, list(own.consts)
+            machine = _kernel_files.MachineCode(path.name, code, entry, *held, defines, *linked)
+            write_checked(path, dumps(machine) + dumps((signature, notes, payload)))
         except OSError as error:
             why = error.strerror or error
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")
 
     def _file(self, signature: Any, target: Any) -> str:
-        places = _places(getattr(signature, "args", signature))
-        key = repr((self.made_from, target, signature, places))
-        return f"{self.name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{ENDING}"
-
-
-@functools.cache
-def _find_memory() -> None:
-    """Name what compiled kernels call for their memory; the rest of it is compiled into them."""
-    # numba does so as well, and then compiles that rest in each process, for 20 ms.
-    for name, address in _nrt_python.c_helpers.items():
-        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
-
-
-def _is_listed(name: str, signature: Any) -> bool:
-    return name in kernel_names() and tuple(signature) in signatures_of(name)
+        kinds = _kinds_of(getattr(signature, "args", signature))
+        of_it = self.function, numba.__version__, self.closed
+        return _kernel_files.file_name(*of_it, target, kinds)
 
 
 @functools.cache
 def _compiled(names: tuple[str, ...]) -> bool:
     """Have kernels compiled, the first time that one of them is missing."""
-    if shipped_folder() and not later_uses(names[0]):
+    if shipped_folder() and not _kernel_list.later_uses(names[0]):
         say_once("shipped", f"{shipped_folder()}: {OTHER}")
     try:
         failed = compile_missing(names)
@@ -150,15 +138,12 @@ def _compiled(names: tuple[str, ...]) -> bool:
     return failed is not None
 
 
-def _places(kinds: Any) -> list[str]:
-    """The modules that types are from: numba fails to load code for structures that have moved."""
-    found = []
-    for kind in kinds:
-        if isinstance(kind, BaseTuple):
-            found += [getattr(kind, "instance_class", tuple).__module__, *_places(kind.types)]
-    return found
-
-
-@functools.cache
-def _source_digest(path: str) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+def _kinds_of(types: Any) -> str:
+    """Types of arguments, as names of files have them."""
+    kinds = []
+    for kind in types:
+        try:
+            kinds.append(_kernel_list.stated_kind(_kernel_list.stated(kind)))
+        except (AttributeError, ImportError, ValueError):  # of a kind that no list has
+            kinds.append(str(kind))
+    return ",".join(kinds)

@@ -11,8 +11,10 @@ import functools
 import importlib
 import json
 import re
+import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 FILE = Path(__file__).with_name("kernels.json")
@@ -72,15 +74,23 @@ LATER = tuple(use for use in USES if use not in NOW)  # what it leaves to its fi
 
 Stated = Any  # a type as the list has it
 
+MANY = 50_000_000  # characters of `told`, for which numba, imported, would have taken 0.3 s less
+
+told = 0  # characters of types of arguments that were told without numba
 _asked: set[str] = set()  # uses that kernels were loaded for: those that lack are compiled at once
 
 
 def load_kernels(*uses: str) -> None:
-    """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
+    """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs.
+
+    Here a process that calls kernels again and again goes over to numba, which tells types sooner.
+    """
+    if told > MANY:
+        importlib.import_module("numba")
     _asked.update(uses)
     for use in uses:
         for module in USES[use]:
-            _load(f"{__package__}.{module}")
+            _load(f"{__package__}.{module}", "numba" in sys.modules)
 
 
 def kernel_names() -> list[str]:
@@ -108,18 +118,12 @@ def compiled_with(name: str) -> list[str]:
 
 
 @functools.cache
-def _load(module: str) -> None:
-    from numba.extending import typeof_impl
-
-    for name in _rows():
+def _load(module: str, _numba: bool) -> None:
+    for name, rows in _rows().items():
         one: Any = kernel_named(name) if module in name else None
-        if not hasattr(one, "compile"):  # of another module, or numba is switched off
-            continue
-        for kinds in signatures_of(name):
-            one.compile(kinds)
-            for kind in kinds:  # or the first call looks for what types such tuples have
-                if hasattr(kind, "instance_class"):
-                    typeof_impl.dispatch(kind.instance_class)
+        for n, row in enumerate(rows if hasattr(type(one), "load") else ()):  # or switched off
+            if not one.load(",".join(map(stated_kind, row))):
+                one.compile(signatures_of(name)[n])
 
 
 @functools.cache
@@ -184,9 +188,7 @@ def type_of(name: Stated) -> Any:
 
     if isinstance(name, dict):
         ((place, fields),) = name.items()
-        module, qualified = place.split(":")
-        holder = getattr(importlib.import_module(module), qualified)
-        return BaseTuple.from_types(tuple(map(type_of, fields)), holder)
+        return BaseTuple.from_types(tuple(map(type_of, fields)), resolve_name(place))
     if isinstance(name, list):
         return BaseTuple.from_types(tuple(map(type_of, name)))
     if name in LITERALS:
@@ -198,3 +200,20 @@ def type_of(name: Stated) -> Any:
         dtype, axes, layout, held = found.groups()
         return types.Array(type_of(dtype), int(axes), layout, readonly=bool(held))
     return getattr(types, "boolean" if name == "bool" else name)
+
+
+def stated_kind(name: Stated) -> str:
+    """How names of files have a type of the list."""
+    if isinstance(name, dict):
+        ((place, name),) = name.items()
+        return f"{record_name(resolve_name(place))}({','.join(map(stated_kind, name))})"
+    return f"({','.join(map(stated_kind, name))})" if isinstance(name, list) else str(name)
+
+
+@functools.cache
+def record_name(record: Any) -> str:
+    """Where a class of tuples is from and what its fields are: compiled code has their order."""
+    if record is tuple:
+        return ""
+    by_value = " by value" if getattr(record, "by_value", False) else ""
+    return f"{record.__module__}:{record.__qualname__}{by_value} {' '.join(record._fields)}"

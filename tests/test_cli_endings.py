@@ -18,8 +18,7 @@ import pytest
 
 from maneuver_automaton import _cache_files, _files, _kernel_folders, planning
 from maneuver_automaton._interrupts import (
-    compiler_began,
-    compiler_ended,
+    compiler_works,
     listening,
     patient,
     stopped,
@@ -161,11 +160,11 @@ def test_a_plan_that_nobody_interrupts_does_not_say_so():
 
 def test_while_a_kernel_is_compiled(monkeypatch):
     def compiling(problem, **settings):
-        compiler_began()
+        compiler_works(True)
         try:
             at_once()
         finally:
-            compiler_ended()
+            compiler_works(False)
 
     monkeypatch.setattr(planning, "plan", compiling)
     with listening():

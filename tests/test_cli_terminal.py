@@ -67,9 +67,11 @@ def test_quiet_is_quiet_on_a_terminal_too(tmp_path):
 COMPILES = """
 import time
 from numba.core import event
+from maneuver_automaton._compile import _meet_numba
 from maneuver_automaton._compile_all import _bar
 from maneuver_automaton.cli.terminal import announced, progress_bar, waiting
 
+_meet_numba()
 with announced(), progress_bar("files", 2, quiet=False), waiting("planning", quiet=False):
     time.sleep(0.3)
     with event.trigger_event("numba:compile", data={}), _bar() as bar:

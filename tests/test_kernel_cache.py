@@ -70,7 +70,9 @@ def test_a_damaged_file_is_compiled_again_and_mended(tmp_path, said, damage):
     elif damage == "not a pickle":
         _cache_files.write_checked(path, b"I am whole")
     elif damage == "other":
-        _cache_files.write_checked(path, _kernel_cache.dumps(((numba.int64,), {}, ())))
+        _cache_files.write_checked(
+            path, _kernel_cache.dumps(None) + _kernel_cache.dumps(((numba.int64,), {}, ()))
+        )
     else:
         path.write_bytes(damage)
     assert hits(compiled_in(tmp_path)) == 0
@@ -117,7 +119,7 @@ def test_a_file_that_others_can_write_is_not_unpickled(tmp_path, said, monkeypat
     compiled_in(tmp_path)
     (path,) = tmp_path.iterdir()
     path.chmod(mode)
-    monkeypatch.setattr(_kernel_cache.pickle, "loads", None)
+    monkeypatch.setattr(_kernel_cache.pickle, "load", None)
     assert hits(compiled_in(tmp_path)) == 0
     assert stat.S_IMODE(path.stat().st_mode) & 0o022 == 0  # replaced by one of our own
     assert f"writable by others (mode {mode:o})" in said.messages[0]
@@ -126,7 +128,7 @@ def test_a_file_that_others_can_write_is_not_unpickled(tmp_path, said, monkeypat
 @POSIX
 def test_a_file_of_somebody_else_is_not_unpickled(tmp_path, said, monkeypatch):
     compiled_in(tmp_path)
-    monkeypatch.setattr(_kernel_cache.pickle, "loads", None)
+    monkeypatch.setattr(_kernel_cache.pickle, "load", None)
     monkeypatch.setattr(_cache_files, "distrusted", lambda *_, **__: "owned by another user (7)")
     assert hits(compiled_in(tmp_path)) == 0
     assert "owned by another user (7)" in said.messages[0]

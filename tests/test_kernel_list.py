@@ -11,7 +11,7 @@ import numba
 import pytest
 
 import maneuver_automaton
-from maneuver_automaton import _compile_all, _kernel_cache, _kernel_list
+from maneuver_automaton import _compile_all, _kernel_cache, _kernel_files, _kernel_list
 from maneuver_automaton._kernel_cache import KernelCache
 from maneuver_automaton._kernel_list import (
     LATER,
@@ -91,16 +91,16 @@ made.compile((numba.types.float64,))
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-@pytest.mark.skipif(_compile_all.processors()[0] == "generic", reason="kinds of x86-64")
+@pytest.mark.skipif(_kernel_files.processors()[0] == "generic", reason="kinds of x86-64")
 def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_need(
     tmp_path, monkeypatch
 ):
     came, own = tmp_path / "came", tmp_path / "own"
     came.mkdir()
     own.mkdir()
-    env = {**os.environ, "NUMBA_CPU_NAME": _compile_all.processors()[0], "NUMBA_CPU_FEATURES": ""}
+    env = {**os.environ, "NUMBA_CPU_NAME": _kernel_files.processors()[0], "NUMBA_CPU_FEATURES": ""}
     subprocess.run([sys.executable, "-c", MADE_FOR_ALL, str(came)], env=env, check=True)
-    monkeypatch.setattr(_kernel_cache, "shipped_folder", lambda: came)
+    monkeypatch.setattr(_kernel_files, "shipped_folder", lambda: came)
 
     def hits():
         made = numba.njit(nogil=True)(third)
@@ -109,7 +109,7 @@ def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_n
         return sum(made.stats.cache_hits.values())
 
     assert hits() == 1
-    monkeypatch.setattr(_kernel_cache, "processors", lambda: ["another"])
+    monkeypatch.setattr(_kernel_files, "processors", lambda: ["another"])
     assert hits() == 0  # compiled for this one, into the user's folder
     assert hits() == 1
 

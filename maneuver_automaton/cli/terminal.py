@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from maneuver_automaton import recording
-from maneuver_automaton._interrupts import compiler_began, compiler_ended
+from maneuver_automaton._interrupts import compiler_watched
 from maneuver_automaton.cli.guard import complain
 from maneuver_automaton.recording import Fact
 
@@ -196,28 +196,16 @@ def announced(*, quiet: bool = False) -> Iterator[None]:
     The compiler asks for no time limit: while it is at work a signal breaks off. It may show a bar
     of its own: that of the command is gone meanwhile.
     """
-    from numba.core import event
+    said, depth = quiet, 0
 
-    class Announcement(event.Listener):  # type: ignore[misc]
-        said = quiet
-        depth = 0
+    def watch(begins: bool) -> None:
+        nonlocal said, depth
+        depth += 1 if begins else -1
+        for bar in _shown if depth == begins else ():
+            bar.stop() if begins else bar.start()
+        if begins and not said:
+            complain(COMPILING)
+            said = True
 
-        def on_start(self, event: Any) -> None:
-            compiler_began()
-            self.depth += 1
-            if self.depth == 1:
-                for bar in _shown:
-                    bar.stop()
-            if not self.said:
-                complain(COMPILING)
-            self.said = True
-
-        def on_end(self, event: Any) -> None:
-            compiler_ended()
-            self.depth -= 1
-            if self.depth == 0:
-                for bar in _shown:
-                    bar.start()
-
-    with event.install_listener("numba:compile", Announcement()):
+    with compiler_watched(watch):
         yield
