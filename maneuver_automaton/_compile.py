@@ -1,7 +1,8 @@
 """The `kernel` decorators: compile a loop once, and never run a stale one.
 
 Compiled code is kept on disk (`_kernel_folders`), and runs without numba (`_kernel_files`): that is
-imported where a kernel has to be compiled. Where nothing can be written, kernels work without.
+imported where a kernel has to be compiled, and by what will call kernels again and again, as it
+tells types sooner. Where nothing can be written, kernels work without.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from maneuver_automaton import _kernel_list
 from maneuver_automaton._cache_files import PLAINLY, say_once
 from maneuver_automaton._interrupts import compiler_works
 from maneuver_automaton._kernel_files import kinds_of, loaded
@@ -56,7 +56,6 @@ class CompiledLater:
             kinds = kinds_of(args)
         except (AttributeError, KeyError):  # what only numba can type
             return None
-        _kernel_list.told += len(kinds)
         return self.loaded.get(kinds) or self.load(kinds)
 
     def _run_without_numba(self, *args: Any) -> Any:

@@ -74,23 +74,20 @@ LATER = tuple(use for use in USES if use not in NOW)  # what it leaves to its fi
 
 Stated = Any  # a type as the list has it
 
-MANY = 50_000_000  # characters of `told`, for which numba, imported, would have taken 0.3 s less
-
-told = 0  # characters of types of arguments that were told without numba
 _asked: set[str] = set()  # uses that kernels were loaded for: those that lack are compiled at once
 
 
 def load_kernels(*uses: str) -> None:
-    """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs.
-
-    Here a process that calls kernels again and again goes over to numba, which tells types sooner.
-    """
-    if told > MANY:
-        importlib.import_module("numba")
+    """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
     _asked.update(uses)
     for use in uses:
         for module in USES[use]:
             _load(f"{__package__}.{module}", "numba" in sys.modules)
+
+
+def expect_many_calls() -> None:
+    """Go over to numba, which tells types of arguments sooner, once and before a clock runs."""
+    importlib.import_module("numba")
 
 
 def kernel_names() -> list[str]:

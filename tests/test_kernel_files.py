@@ -94,15 +94,14 @@ def test_what_was_compiled_runs_without_numba_and_then_with_it(example):
 
 
 OFTEN = """
-from maneuver_automaton import _kernel_list
-_kernel_list.MANY = 0
-_kernel_list.load_kernels()
+from maneuver_automaton._kernel_list import expect_many_calls
+expect_many_calls()
 told += ["numba" in sys.modules, repr(example.waves(pair, True)) == repr(results[0])]
 told += [len(example.waves.signatures)]
 """
 
 
-def test_a_process_that_calls_kernels_often_goes_over_to_numba(example):
+def test_what_will_call_kernels_often_goes_over_to_numba(example):
     folder, result = example
     told = run(CALL + OFTEN + LAST, folder, NUMBA_CACHE_DIR=folder / "cache")
     assert told == [result, False, True, True, 1]

@@ -13,7 +13,7 @@ from typing import Any
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_with
-from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton._kernel_list import expect_many_calls, load_kernels
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning import leaving, no_way, polishing, proving
 from maneuver_automaton.planning.checking import load_checks
@@ -166,6 +166,7 @@ def _noted(result: PlanResult) -> PlanResult:
 
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     """Have ready what every problem on the map of this one needs."""
+    expect_many_calls()
     workspace = workspace or workspace_of(problem.obstacles)
     load(problem, workspace)
     problem = between_trims(problem)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, as_number
-from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton._kernel_list import expect_many_calls, load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
@@ -178,6 +178,7 @@ class RecedingHorizon:
         if last is not None and not settings.continuous:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
+        expect_many_calls()
         load_search(problem)
         self.proven = None if settings.gap is None else LoopBounds.ready(settings.gap)
 
