@@ -87,13 +87,13 @@ class Turns:
             to_come = [*waiting, *self.without_plan(held, {k, *waiting})]
             hurried = hurried or is_short(self.budget, 1 + len(waiting))
             found = self.past(k, held, to_come, hurried=hurried)
-            may_evict = evicted < MOST_EVICTED and k not in failed
+            may_evict = k not in failed and (hurried or evicted < MOST_EVICTED)
             hurried = hurried or (found is None and is_short(self.budget, AS_LONG + len(waiting)))
             if found is None and not (hurried and may_evict):
                 found = self.past(k, held, self.without_plan(held, {k, *waiting}), most=self.most)
             if found is None and may_evict:
                 failed.add(k)
-                found, out = self._before_those_it_hits(k, held)
+                found, out = self._before_those_it_hits(k, held, hurried=hurried)
                 for other in out:
                     del held[other]
                 waiting = [*out, *waiting]
@@ -120,16 +120,23 @@ class Turns:
         """Vehicles that stand at their starts for ever."""
         return [k for k in range(len(self.vehicles)) if k not in held and k not in but]
 
-    def _before_those_it_hits(self, k: int, held: HeldPlans) -> tuple[OwnPlan | None, list[int]]:
+    def _before_those_it_hits(
+        self, k: int, held: HeldPlans, *, hurried: bool
+    ) -> tuple[OwnPlan | None, list[int]]:
         """A way past those that have no plan, and whose plans it needs to be given up."""
-        found = self.past(k, {}, self.without_plan(held, {k}))
-        if found is None:
-            found = self.past(k, {}, [])
-        if found is None:
-            return None, []
-        courses = {other: one.course for other, one in held.items()}
-        met = meetings({**courses, k: found.course}, keep=self.margin, among=[k])
-        return found, sorted({m.other_than(k) for m in met})
+        over = self._hit(self.vehicles[k].standing, k, held)  # those that drive over its start
+        left = {other: one for other, one in held.items() if other not in over}
+        tries = [(left, self.without_plan(left, {k}))] if hurried and over else []
+        for those, standing in (*tries, ({}, self.without_plan(held, {k})), ({}, [])):
+            found = self.past(k, those, standing, hurried=hurried)
+            if found is not None:
+                return found, self._hit(found.course, k, held)
+        return None, []
+
+    def _hit(self, course: FleetCourse, k: int, held: HeldPlans) -> list[int]:
+        """Whom a vehicle meets on a course."""
+        courses = {k: course, **{other: one.course for other, one in held.items()}}
+        return sorted(m.other_than(k) for m in meetings(courses, keep=self.margin, among=[k]))
 
     def past(
         self,
@@ -142,10 +149,7 @@ class Turns:
         hurried: bool = False,
         besides: Sequence[Obstacle] = (),
     ) -> OwnPlan | None:
-        """A way of one vehicle past plans, others at their starts, and more; better `again`.
-
-        `hurried` takes the first that is found.
-        """
+        """A way past plans, those at their starts, and more; better `again`, or the first found."""
         self.queries += 1
         others: list[Obstacle] = []
         for other in sorted({*held, *standing} - {k}):

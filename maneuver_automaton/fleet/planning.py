@@ -199,6 +199,9 @@ class _FleetSearch:
         by_turns = one_at_a_time(self.vehicles, order_of, self.fleet.margin, self.budget)
         before = self._work
         best, to_come, n_th = self._in_orders(drawn[:1], until), drawn[1:], 0
+        if short and (first := [k for k in rest if k not in best]):
+            again = (*first, *(k for k in drawn[0] if k not in first))
+            best = self._in_orders([again], until, best)
         # All the time there is for those that have no plan, in turn by both ways, with about the
         # same work; ever more orders stand between, however many processes there are.
         due = self._work - before
@@ -408,10 +411,9 @@ class _FleetSearch:
         alone = self.vehicles[k].alone
         if alone is None:
             return "it has no path even alone"
-        courses = courses_of(self.vehicles, {**self.held, k: alone})
-        met = meetings(courses, keep=self.fleet.margin, among=[k])
+        driven = courses_of(self.vehicles, {**self.held, k: alone})
         rows = []
-        for one in met:
+        for one in meetings(driven, keep=self.fleet.margin, among=[k]):
             j = one.other_than(k)
             other = self.vehicles[j].name + ("" if j in self.held else STANDS)
             x, y = alone.plan.pose_at(max(one.time, alone.plan.start_time))[:2]

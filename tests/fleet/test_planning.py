@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
+from maneuver_automaton.fleet.coordination import Turns
+from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
@@ -31,6 +35,22 @@ def test_cars_whose_ways_cross_let_each_other_pass():
     between, _ = fleets.least_distances(result)
     assert 0.0 < result.clearance_m <= between + 1e-6
     assert result.closest[0].pair == ("a", "b")
+
+
+def test_with_little_time_who_drives_over_a_start_is_planned_behind_it():
+    """Of two that are in the way of a car, the one that does not keeps its plan."""
+    up = math.pi / 2
+    fleet = fleets.fleet_of(
+        [([0, 0, 0], [8, 0, 0]), ([0, -4, up], [0, 4, up]), ([1.8, -2, up], [1.8, 6, up])]
+    )
+    vehicles, little = vehicles_of(fleet), Budget(began=0.0, deadline=0.01, clock=lambda: 0.0)
+    for one in vehicles:
+        one.plan_alone(little, hurried=True)
+    held = {k: vehicles[k].alone for k in (1, 2)}
+    turns = Turns(vehicles, fleet.margin, little)
+    found, given_up = turns._before_those_it_hits(0, held, hurried=True)
+    assert given_up == [1]
+    assert not meetings({0: found.course, 2: held[2].course}, keep=0.0)
 
 
 def test_cars_on_a_circle_change_sides():
