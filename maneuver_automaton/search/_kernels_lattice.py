@@ -369,7 +369,8 @@ def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate:
                         scratch.costs[k] = math.inf
             which = free_candidate(scene, lib, words, joint, n, scratch)
             enough = which >= 0 or n >= asked.tries or few >= most
-            found[EXCESS] *= LESS if enough else MORE
+            if few < most:
+                found[EXCESS] *= LESS if enough else MORE
             few = most
         if which >= 0 and task.sign > 0.0:
             trim = max(joint.after, 0)
