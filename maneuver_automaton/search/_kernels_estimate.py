@@ -50,17 +50,6 @@ def table_value(
 
 
 @bare_inner_kernel
-def table_to_go(table: CostTable, task: Task, x: float, y: float, heading: float) -> float:
-    """Cost to go to the nearest aim by the table; 0 where it does not reach one of them."""
-    least = math.inf
-    for aim in range(task.aims.poses.shape[0]):
-        least = min(least, table_value(table, task, aim, x, y, heading))
-        if least == 0.0:
-            break
-    return least
-
-
-@bare_inner_kernel
 def cost_to_go(
     task: Task,
     grid: DistanceGrid,
@@ -87,7 +76,10 @@ def cost_to_go(
     # an estimate of the whole cost, so the largest counts, not the sum.
     estimate = length * known.per_metre
     if estimate < math.inf and table.value.shape[0] > 0:
-        estimate = max(estimate, table_to_go(table, task, x, y, heading))
+        least = math.inf
+        for g in range(aims.shape[0]):
+            least = min(least, table_value(table, task, g, x, y, heading))
+        estimate = max(estimate, least)
     if rise > 0.0:
         estimate = max(estimate, rise * known.per_climb)
     return estimate + known.surplus[trim]  # of no trim, -1, the last

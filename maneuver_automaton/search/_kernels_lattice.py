@@ -40,6 +40,7 @@ from maneuver_automaton.search._kernels_nodes import (
     COASTED,
     COST,
     COUNT,
+    EXCESS,
     EXPANSIONS,
     FOUND,
     FREE,
@@ -71,8 +72,11 @@ from maneuver_automaton.search._kernels_nodes import (
 )
 from maneuver_automaton.search._kernels_place import coast_place, edge_place, places_cost
 from maneuver_automaton.search.arrays import Joint, LatticeArrays, LatticeSearch, SearchArrays, Task
-from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
+from maneuver_automaton.words._kernels_candidates import NEARLY, candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import class_of, price_of_switch
+from maneuver_automaton.words._kernels_shortest import least_cost
+
+LESS, MORE = 0.95, 2.0  # how what the words tried first may cost changes: were there enough?
 
 
 @bare_kernel
@@ -127,10 +131,9 @@ def _push_roots(search: LatticeSearch) -> None:
     arrays, roots = search.arrays, search.task.roots
     grid, table, plane = search.grid, search.table, search.scene.layers.plane
     state, generation = arrays.state, arrays.state[GENERATION]
-    state[BEGUN] = 1
+    state[BEGUN], arrays.found[EXCESS] = 1, 0.25 * task.connecting.slack
     for r in range(roots.poses.shape[0]):
         pose = (roots.poses[r, 0], roots.poses[r, 1], roots.poses[r, 2], roots.poses[r, 3])
-        x, y, heading, z = pose
         trim = roots.trims[r]
         estimate = cost_to_go(task, grid, table, plane, pose, trim)
         key = cell_key(task.cells, pose, layer_of(task.cells, lib, trim, 0, 0), 0.0, 0)
@@ -138,7 +141,7 @@ def _push_roots(search: LatticeSearch) -> None:
         # A root that cannot reach an aim, or shares its cell with an earlier one, is left out.
         if estimate == math.inf or node_in(arrays.table, generation, slot) >= 0:
             continue
-        row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
+        row = (*pose, 0.0, 0.0, 0.0, 0.0, 0.0)
         order = 0.0 + task.estimates.weight * estimate
         add_node(arrays, slot, key, row, (-1, trim, 0, 0, r, ROOTED), order)
 
@@ -238,7 +241,6 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
                 fine, clearance = 1, 0.0
                 cost, time = done + price + t * lib.library.rates[trim], spent + t
                 child = coasted(lib, trim, pose, task.sign * t)
-                n_x, n_y, n_heading, n_z = child
                 key = cell_key(cells, child, layer, time, 1)
                 slot = slot_of(cells_of, generation, key)
                 old = node_in(cells_of, generation, slot)
@@ -252,7 +254,7 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
             if fits:
                 if old >= 0:
                     links[old, CLOSED] = 1
-                row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(clearance, 0.0))
+                row = (*child, cost, time, t, lasted + t, max(clearance, 0.0))
                 link = (node, trim, new_gear, count, links[node, ROOT], COASTED)
                 add_node(arrays, slot, key, row, link, cost + weight * ahead)
             if fine:
@@ -285,7 +287,6 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
         if cost >= limit or time > limits.most_time:
             continue
         child = edge_end(lib, edge, pose)
-        n_x, n_y, n_heading, n_z = child
         layer = layer_of(cells, lib, target, gear, count + 1)
         key = cell_key(cells, child, layer, time, 0)
         slot = slot_of(cells_of, generation, key)
@@ -309,7 +310,7 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
                 continue
         if old >= 0:
             links[old, CLOSED] = 1
-        row = (n_x, n_y, n_heading, n_z, cost, time, 0.0, 0.0, clearance)
+        row = (*child, cost, time, 0.0, 0.0, clearance)
         link = (node, target, gear, count + 1, links[node, ROOT], edge)
         add_node(arrays, slot, key, row, link, cost + weight * ahead)
 
@@ -338,28 +339,39 @@ def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate:
         # What a connection may cost: less than is left to the best plan, and not much more than the
         # estimate.
         left_over = min(upper_bound, found[0]) - done
-        most = left_over
-        if estimate < math.inf:
-            most = min(most, asked.factor * estimate + asked.slack)
+        most = min(left_over, asked.factor * estimate + asked.slack)
         there = trim_and_gear(aims.trims[g], 0)
         begin, first, end, last = pose, here, aim, there
-        clock = limits.clock + spent
         if task.sign < 0.0:  # the node is nearer to the goal: the word leads from the start to it
             begin, first, end, last = aim, there, pose, here
-            clock = limits.clock
-        # In the order of their price: words in closed form, limits of words, then the proofs, the
-        # cheapest word first, until one is free or `tries` are not.
-        n = candidates(lib.library, words, n_words, begin, first, end, last, most, scratch)
-        if asked.checks_words:
-            for k in range(n):
-                if not word_admitted(arrays, task, lib, words, node, k):
-                    scratch.costs[k] = math.inf
-        left = limits.most_time - spent
-        if places_cost(scene):  # they may make it cost more than what the estimate allows
-            most = left_over
-        joint = Joint(begin, int(first[0]), int(last[0]), clock, asked.tries, most, left)
-        which = free_candidate(scene, lib, words, joint, n, scratch)
+        clock = limits.clock + (spent if task.sign > 0.0 else 0.0)
+        # In the order of their price: the shortest path, which no word undercuts, words in closed
+        # form, limits of words, then the proofs, the cheapest word first, until one is free or
+        # `tries` are not.
         state[QUERIES] += 1
+        known, left, priced = task.estimates, limits.most_time - spent, places_cost(scene)
+        least = least_cost(0.0 if free_heading else known.radius, known.per_metre, begin, end, most)
+        if known.radius > 0.0 and least * (1.0 - NEARLY) >= most:
+            continue
+        # Where nothing but their cost says which words are tried, those that cost not much more
+        # than the shortest path come first, and the others only where these are too few.
+        judged = asked.checks_words or priced or left < math.inf
+        few = most if judged else min(most, least + found[EXCESS])
+        # Prices of places may make it cost more than what the estimate allows.
+        limit = left_over if priced else most
+        joint = Joint(begin, int(first[0]), int(last[0]), clock, asked.tries, limit, left)
+        n, which, enough = 0, -1, False
+        while not enough:
+            n = candidates(lib.library, words, n_words, begin, first, end, last, few, scratch)
+            if asked.checks_words:
+                for k in range(n):
+                    if not word_admitted(arrays, task, lib, words, node, k):
+                        scratch.costs[k] = math.inf
+            which = free_candidate(scene, lib, words, joint, n, scratch)
+            enough = which >= 0 or n >= asked.tries or few >= most
+            if few < most:
+                found[EXCESS] *= LESS if enough else MORE
+            few = most
         if which >= 0 and task.sign > 0.0:
             trim = max(joint.after, 0)
             arrival = clock + scratch.durations[which]

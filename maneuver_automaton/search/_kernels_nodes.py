@@ -20,9 +20,9 @@ The open list is a binary heap in `heap_key` and `heap_node` (n,), ordered by th
 weighted cost to go. A node is pushed once, when it is made. A cheaper node of its cell closes it,
 and leaves it in the heap; it is passed over when it is popped.
 
-`state` (13,) are the numbers named below; `found` (5,) is the cost of the cheapest plan found, then
-the durations of the three trims of its connection and of the climb. `scratch` holds the candidates
-of one connection.
+`state` (13,) are the numbers named below; `found` (6,) is the cost of the cheapest plan found, then
+the durations of the three trims of its connection and of the climb, then what words that are tried
+first may cost beyond the shortest path. `scratch` holds the candidates of one connection.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ SIDE_BY_SIDE = 2  # binary digits of a key that number the rows of one line of t
 NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
 X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
 PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
+EXCESS = 5  # the last column of `found`
 (
     N_NODES,  # nodes in use
     HEAP,  # entries of the open list

@@ -212,7 +212,7 @@ class SearchArrays(NamedTuple):
     heap_key: Array
     heap_node: IntArray
     state: IntArray  # (13,)
-    found: Array  # (5,) cost, three durations and that of a climb
+    found: Array  # (6,) cost, three durations and that of a climb, and an excess
     scratch: Scratch
 
 
@@ -246,6 +246,7 @@ class Estimates(NamedTuple):
     weight: float  # of the estimate in the open list
     per_metre: float  # least cost per metre
     per_climb: float  # least cost per metre of altitude
+    radius: float  # [m] of turns, for `least_cost`; 0 where any is left to maneuvers
     surplus: Array  # (m + 1,) of maneuvers from a trim to an aim's, the least; the last of no trim
 
 

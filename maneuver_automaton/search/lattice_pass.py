@@ -287,13 +287,9 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
         state=np.zeros(13, dtype=np.int64),
-        found=np.zeros(5),
+        found=np.zeros(6),
         scratch=scratch_of(library),
     )
-
-
-def _spare(prepared: Prepared, library: LatticeLibrary) -> list[SearchArrays]:
-    return kept_with(library, prepared, list)
 
 
 def arrays_for(
@@ -302,7 +298,7 @@ def arrays_for(
     """Arrays in which nothing is searched, with room: `known` ones, or an earlier search's."""
     if known is None:
         try:
-            known = _spare(prepared, library).pop()
+            known = kept_with(library, prepared, list[SearchArrays]).pop()
         except IndexError:  # asked for before, another thread might take the last one
             known = search_arrays(library.arrays.library)
     search = with_room(known, nodes)
@@ -315,7 +311,7 @@ def arrays_for(
 
 def give_back(prepared: Prepared, library: LatticeLibrary, arrays: SearchArrays) -> None:
     """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
-    spare = _spare(prepared, library)
+    spare = kept_with(library, prepared, list[SearchArrays])
     if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
         spare.append(arrays)
 

@@ -24,6 +24,7 @@ from maneuver_automaton.search.arrays import (
 from maneuver_automaton.search.distance_grid import OCTILE
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.shortest import least_radius
 
 HEADINGS = 72
 FINE_HEADINGS = 250
@@ -127,7 +128,7 @@ def _sizes(
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
     by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
-    durations = library.arrays.coasts.durations
+    numbered, durations = library.arrays.library, library.arrays.coasts.durations
     lasting = durations[durations > 0.0]
     tick = resolution.durations * float(lasting.min()) if lasting.size else 1.0
     task = Task(
@@ -151,6 +152,7 @@ def _sizes(
             weight=float(resolution.weight),
             per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
             per_climb=float(library.per_climb),
+            radius=least_radius(numbered.twists[:-1]) if library.at_will else 0.0,
             surplus=np.zeros(0),
         ),
         connecting=Connecting(
@@ -193,10 +195,6 @@ def _layers(
 
 def goal_roots(query: LatticeQuery) -> EndArrays:
     """Poses (R, 4) at the goals, a few headings where any will do, and their trims."""
-    none = np.zeros(len(query.goals), dtype=np.bool_)
-    if not query.free_heading.any():
-        trims = np.array(query.goal_trims, dtype=np.int64)
-        return EndArrays(np.array(query.goals), trims, none)
     rows, numbers = [], []
     for goal, free, trim in zip(query.goals, query.free_heading, query.goal_trims, strict=True):
         turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)

@@ -92,6 +92,26 @@ def in_the_problem(query, nodes):
     return poses
 
 
+@pytest.mark.parametrize("name", ["map", "goals", "free heading"])
+def test_words_left_out_or_looked_for_late_change_no_search(name):
+    query = query_of(PROBLEMS[name])
+    grid, resolution = distance_grids(query)[0], Resolution(stop=False)
+    one, other = (pass_of(query, resolution, grid=grid) for _ in range(2))
+    task = other.search.task  # without the shortest path, and with all words at once
+    estimates = task.estimates._replace(radius=0.0)
+    task = task._replace(
+        estimates=estimates, connecting=task.connecting._replace(checks_words=True)
+    )
+    other.search = other.search._replace(task=task)
+    assert one.search.task.estimates.radius > 0.0
+    one.run(EXPANSIONS, math.inf)
+    other.run(EXPANSIONS, math.inf)
+    assert one.arrays.state[layout.FOUND]
+    used = int(one.arrays.state[layout.N_NODES])
+    assert np.array_equal(one.arrays.nodes[:used], other.arrays.nodes[:used])
+    assert np.array_equal(one.arrays.found[:5], other.arrays.found[:5])
+
+
 TIGHT = Resolution(truncated=True, scale=0.5, durations=0.5, stop=False)
 
 
