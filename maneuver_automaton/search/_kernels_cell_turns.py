@@ -155,28 +155,30 @@ def straight_between(
         return 0.0, 0.0
     begin = (still * velocity.conjugate()).real / speed
     aside = (still * velocity.conjugate()).imag / speed
-    low, high = max(abs(d) - around, 0.0), abs(d) + around
+    way = abs(d)
+    low, high = max(way - around, 0.0), way + around
     if high < abs(aside):
         return math.inf, math.inf
     nearest = math.sqrt(max(0.0, (low - aside) * (low + aside)))
     farthest = math.sqrt(max(0.0, (high - aside) * (high + aside)))
-    first, last = phase(d) - turned - phase(velocity), heading - phase(d) + phase(velocity)
-    off = math.asin(around / abs(d)) if around < abs(d) else math.pi
+    aim, ahead = phase(d), phase(velocity)
+    first, last = aim - turned - ahead, heading - aim + ahead
+    off = math.asin(around / way) if around < way else math.pi
     if abs(aside) <= around and nearest <= around:  # the vector may vanish: it has any direction
         off = math.pi
+    one, other = math.atan2(aside, nearest), math.atan2(aside, farthest)
+    one, other = min(one, other), max(one, other)
+    straight = math.copysign(math.pi, aside)  # the way back is as far from it as the way ahead
     later, earlier = math.inf, math.inf
     if farthest - begin >= -TINY * (speed + high):
         later = prices[1] * max(0.0, (nearest - begin) / speed)
-        one, other = math.atan2(aside, nearest), math.atan2(aside, farthest)
-        one, other = min(one, other), max(one, other)
         later += prices[0] * least_turn(
             first - other - off - spread, first - one + off + spread, turn_rates[0]
         )
         later += prices[2] * least_turn(last + one - off, last + other + off, turn_rates[1])
     if -nearest - begin >= -TINY * (speed + high):
         earlier = prices[1] * max(0.0, (-farthest - begin) / speed)
-        one, other = math.atan2(aside, -nearest), math.atan2(aside, -farthest)
-        one, other = min(one, other), max(one, other)
+        one, other = straight - other, straight - one
         earlier += prices[0] * least_turn(
             first - other - off - spread, first - one + off + spread, turn_rates[0]
         )

@@ -55,8 +55,7 @@ def scan_one(
     upper_bound: float,
 ) -> None:
     """Words with one free time: roots of a scalar function along both branches."""
-    four = with_free_time(problem, word, n, triple)
-    q = four.q
+    q = 6 - triple[0] - triple[1] - triple[2]
     m = problem.library.targets.size
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
@@ -72,6 +71,7 @@ def scan_one(
         cheap -= problem.terms.pad_cost + word_extra(problem, word, n)
         if not mark_cheap_cells(known, reach, cheap, live):
             return
+    four = with_free_time(problem, word, n, triple)
     needed = np.zeros((2, nodes + 1), dtype=np.bool_)  # a cell's nodes, and one on either side
     for branch in range(2):
         for j in range(nodes):
@@ -112,6 +112,7 @@ def scan_one(
                     node_values[branch, j] = node_values[branch, j - 1] + step
                 else:
                     node_values[branch, j] = condition(problem, word, n, m - 1, times)
+    ends = np.full(nodes, math.nan)  # free times at which branches end, where they do in a cell
     stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
     for branch in range(2):
         for j in range(nodes):
@@ -136,41 +137,35 @@ def scan_one(
             low[0, q], high[0, q] = reach * j / nodes, reach * (j + 1) / nodes
             numbers[0, 0], numbers[0, 1] = node_values[branch, j], node_values[branch, j + 1]
             numbers[0, 2], numbers[0, 3] = bend, 0.0
-            if not there[branch, j + 1]:  # the branch ends in between
-                assign(high[0], low[0])
-                beyond = reach * (j + 1) / nodes
-                numbers[0, 1] = end_of_branch(problem, candidates, four, high[0], beyond, branch)
-            elif not there[branch, j]:
-                assign(low[0], high[0])
-                beyond = reach * j / nodes
-                numbers[0, 0] = end_of_branch(problem, candidates, four, low[0], beyond, branch)
+            here, beyond = (j, j + 1) if there[branch, j] else (j + 1, j)
+            if not there[branch, beyond]:  # both branches end in between, where they meet
+                if math.isnan(ends[j]):
+                    between = reach * here / nodes, reach * beyond / nodes
+                    ends[j] = end_of_branches(problem, candidates, four, between, branch)
+                edge = high[0] if beyond > here else low[0]
+                edge[q] = ends[j]
+                numbers[0, beyond - j] = evaluate(problem, candidates, four, edge, branch)
             bisect(problem, candidates, four, branch, stack, known, cheap)
 
 
 @inner_kernel
-def end_of_branch(
+def end_of_branches(
     problem: WordProblem,
     candidates: Candidates,
     four: FreeTime,
-    edge: Array,
-    beyond: float,
+    between: tuple[float, float],
     branch: int,
 ) -> float:
-    """Move `edge` along its branch as far towards `beyond` as the branch goes; its value there."""
-    q = four.q
-    trial = np.empty(edge.size)
-    assign(trial, edge)
-    value = evaluate(problem, candidates, four, trial, branch)
-    good = edge[q]
+    """How far both branches go from a free time with solutions towards one without."""
+    good, beyond = between
+    times = np.empty(four.n)
     for _ in range(30):
-        trial[q] = 0.5 * (good + beyond)
-        there = evaluate(problem, candidates, four, trial, branch)
-        if math.isnan(there):
-            beyond = trial[q]
+        times[four.q] = 0.5 * (good + beyond)
+        if math.isnan(evaluate(problem, candidates, four, times, branch)):
+            beyond = times[four.q]
         else:
-            good, value = trial[q], there
-            assign(edge, trial)
-    return value
+            good = times[four.q]
+    return good
 
 
 @inner_kernel

@@ -16,9 +16,8 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.groups.se2 import seen_from
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.words._kernels_closing import MET
+from maneuver_automaton.words._kernels_closing import MET, close_times
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.closing import EndConditions, closest_times
 from maneuver_automaton.words.library import (
     FULL_TURN,
     MovingTrims,
@@ -208,15 +207,12 @@ class InsertionLibrary:
 
         The smallest change: the goal is less than 1e-9 away, and less for small ones.
         """
-        others = slice(int(self.climbs), None)  # an end's altitude is a condition anyway
-        conditions = EndConditions(
-            start=np.zeros(4),
-            twists=self.problem.twists[word],
-            goal=goal,
-            rows=self.problem.rows[others, word],
-            targets=self.problem.targets[others],
-        )
-        best, missing = closest_times(conditions, times, rank=RANK, at_least=-math.inf)
+        first, known = int(self.climbs), self.problem  # an end's altitude is a condition anyway
+        start = 0.0 - goal  # from the goal's place no digit is lost
+        start[2] = 0.0
+        end = start, known.twists[word], float(goal[2]), np.zeros(4), False
+        rows, targets = known.rows[first:].take(word, axis=1), known.targets[first:]
+        best, missing = close_times(*end, rows, targets, np.array(times), RANK, -math.inf)
         if not missing < MET or (best < -MET).any():
             return None
         return np.asarray(best.clip(min=0.0))
