@@ -114,6 +114,8 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
+        if share == 1.0:
+            return self
         return replace(self, deadline=self.clock() + share * self.left)
 
     @property
@@ -122,8 +124,8 @@ class Budget:
 
         What other programs have delayed is not late yet: the processor time of this one counts.
         """
-        late = self.seconds + LATE_SHARE * self.seconds + self.late
-        spent = self.elapsed
+        seconds = self.deadline - self.began
+        late, spent = seconds + LATE_SHARE * seconds + self.late, self.clock() - self.began
         if spent >= late:
             spent = min(spent, time.process_time() - self.worked)
         return max(late - spent, 0.0)

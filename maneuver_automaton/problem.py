@@ -533,7 +533,11 @@ class Problem:
 
     def rates_of_trims(self, trims: Sequence[Trim]) -> Array:
         """Cost per second (n,) of some trims, which may be others than the library's."""
-        return _rates_of_trims(self.automaton, self.cost, tuple(trims)).copy()
+        known = _known_rates(self.automaton, self.cost)
+        try:
+            return np.array([known[trim] for trim in trims])
+        except KeyError:
+            return _rates_of_others(self.automaton, self.cost, tuple(trims)).copy()
 
     def cost_of(self, plan: Plan) -> float:
         """Cost of a plan of any primitives: `invariant_cost_of`, and what places cost."""
@@ -592,7 +596,7 @@ class Problem:
         """Invariant cost of trims that last `durations` (n,) [s], with the switches between."""
         if not trims:
             return 0.0
-        coasting = float(_rates_of_trims(self.automaton, self.cost, tuple(trims)) @ durations)
+        coasting = float(self.rates_of_trims(trims) @ durations)
         if not prices_switches(self.cost):
             return coasting
         return coasting + self.cost.switching(np.array([trim.body_velocity for trim in trims]))
@@ -800,7 +804,7 @@ class Problem:
     @functools.cached_property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return any(moves(obstacle) for obstacle in self.obstacles)
+        return any(getattr(one, "motion", None) is not None for one in self.obstacles)
 
 
 def settled_state(
@@ -836,10 +840,7 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 
 @kept_by_first
-def _rates_of_trims(automaton: Automaton, cost: StageCost, trims: tuple[Trim, ...]) -> Array:
-    known = _known_rates(automaton, cost)
-    if all(trim in known for trim in trims):
-        return np.array([known[trim] for trim in trims])
+def _rates_of_others(automaton: Automaton, cost: StageCost, trims: tuple[Trim, ...]) -> Array:
     controls = np.array([one.control for one in trims])
     return cost.rates(controls, np.array([one.body_velocity for one in trims]))
 
