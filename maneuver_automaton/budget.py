@@ -114,9 +114,7 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
-        if share == 1.0:
-            return self
-        return replace(self, deadline=self.clock() + share * self.left)
+        return self if share == 1.0 else replace(self, deadline=self.clock() + share * self.left)
 
     @property
     def left_to_check(self) -> float:

@@ -322,9 +322,8 @@ class Problem:
         self._check_ends()
         check_size("margin", self.margin)
         if self.horizon.time is not None and dof > 2:
-            turns = (
-                self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
-            )
+            fastest = np.abs(self.automaton.body_velocities[:, 2]).max()
+            turns = self.horizon.time * fastest / math.tau
             if turns > MOST_TURNS:
                 raise ValueError(
                     f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "
@@ -571,11 +570,8 @@ class Problem:
     @property
     def bound_place_costs(self) -> tuple[PlaceCost, ...]:
         """The place costs, each knowing the obstacles and the body of the problem."""
-        setting = self.setting
-        key = ("bound place costs", setting.place_costs)
-        return kept_with(
-            setting, key, lambda: tuple(bound(cost, setting) for cost in setting.place_costs)
-        )
+        setting, costs = self.setting, self.setting.place_costs
+        return kept_with(setting, costs, lambda: tuple(bound(one, setting) for one in costs))
 
     def invariant_cost_of(self, plan: Plan) -> float:
         """The part of a plan's cost that does not see where it goes: rates, prices of switches.

@@ -268,9 +268,8 @@ class LatticeWords(PlanningStep):
 
     def _count(self, search: FirstPlan | WordSearch, **more: int) -> None:
         self.spent += search.expansions
-        more = more if self.finds_plans else {}
-        more.update(expansions=search.expansions, collision_queries=search.queries)
-        self.found.counts.update(more)
+        counts = {"expansions": search.expansions, "collision_queries": search.queries}
+        self.found.counts.update(counts | more if self.finds_plans else counts)
 
     def improved(self) -> list[Candidate]:
         """Plans to be checked, the cheapest first: what was found, and others if asked for."""
