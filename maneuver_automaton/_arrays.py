@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+OWN = {"float": float, "int": int, "bool": bool}
 REAL = "biuf"  # kinds of NumPy's types that are real numbers
-FEW = 16  # numbers that are looked at faster one by one
+FEW = 32  # numbers that are looked at faster one by one
 
 
 def as_array(
@@ -64,7 +65,7 @@ def plain_numbers(instance: Any) -> None:
     """
     for name, kind, may_be_none in _numbers_of(instance.__class__):
         value = getattr(instance, name)
-        if not (value is None and may_be_none):
+        if not (value.__class__ is OWN.get(kind) or (value is None and may_be_none)):
             what = f"{instance.__class__.__name__}: {name}"
             object.__setattr__(instance, name, _read(what, value, kind))
 

@@ -12,6 +12,7 @@ import functools
 import weakref
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from types import MethodType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
@@ -64,7 +65,7 @@ def kept_by_first(
     @functools.wraps(make)
     def once(owner: _Owner, /, *args: _P.args, **more: _P.kwargs) -> _T:
         known: Callable[..., _T] | None = owner.__dict__.get("_kept", {}).get(once)
-        return (known or _kept_by(owner, once, functools.partial(make, owner)))(*args, **more)
+        return (known or _kept_by(owner, once, MethodType(make, owner)))(*args, **more)
 
     return once
 

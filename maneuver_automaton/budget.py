@@ -114,7 +114,7 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
-        return replace(self, deadline=self.clock() + share * self.left)
+        return self if share == 1.0 else replace(self, deadline=self.clock() + share * self.left)
 
     @property
     def left_to_check(self) -> float:
@@ -122,8 +122,8 @@ class Budget:
 
         What other programs have delayed is not late yet: the processor time of this one counts.
         """
-        late = self.seconds + LATE_SHARE * self.seconds + self.late
-        spent = self.elapsed
+        seconds = self.deadline - self.began
+        late, spent = seconds + LATE_SHARE * seconds + self.late, self.clock() - self.began
         if spent >= late:
             spent = min(spent, time.process_time() - self.worked)
         return max(late - spent, 0.0)

@@ -322,9 +322,8 @@ class Problem:
         self._check_ends()
         check_size("margin", self.margin)
         if self.horizon.time is not None and dof > 2:
-            turns = (
-                self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
-            )
+            fastest = np.abs(self.automaton.body_velocities[:, 2]).max()
+            turns = self.horizon.time * fastest / math.tau
             if turns > MOST_TURNS:
                 raise ValueError(
                     f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "
@@ -533,7 +532,11 @@ class Problem:
 
     def rates_of_trims(self, trims: Sequence[Trim]) -> Array:
         """Cost per second (n,) of some trims, which may be others than the library's."""
-        return _rates_of_trims(self.automaton, self.cost, tuple(trims)).copy()
+        known = _known_rates(self.automaton, self.cost)
+        try:
+            return np.array([known[trim] for trim in trims])
+        except KeyError:
+            return _rates_of_others(self.automaton, self.cost, tuple(trims)).copy()
 
     def cost_of(self, plan: Plan) -> float:
         """Cost of a plan of any primitives: `invariant_cost_of`, and what places cost."""
@@ -567,11 +570,8 @@ class Problem:
     @property
     def bound_place_costs(self) -> tuple[PlaceCost, ...]:
         """The place costs, each knowing the obstacles and the body of the problem."""
-        setting = self.setting
-        key = ("bound place costs", setting.place_costs)
-        return kept_with(
-            setting, key, lambda: tuple(bound(cost, setting) for cost in setting.place_costs)
-        )
+        setting, costs = self.setting, self.setting.place_costs
+        return kept_with(setting, costs, lambda: tuple(bound(one, setting) for one in costs))
 
     def invariant_cost_of(self, plan: Plan) -> float:
         """The part of a plan's cost that does not see where it goes: rates, prices of switches.
@@ -592,7 +592,7 @@ class Problem:
         """Invariant cost of trims that last `durations` (n,) [s], with the switches between."""
         if not trims:
             return 0.0
-        coasting = float(_rates_of_trims(self.automaton, self.cost, tuple(trims)) @ durations)
+        coasting = float(self.rates_of_trims(trims) @ durations)
         if not prices_switches(self.cost):
             return coasting
         return coasting + self.cost.switching(np.array([trim.body_velocity for trim in trims]))
@@ -800,7 +800,7 @@ class Problem:
     @functools.cached_property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return any(moves(obstacle) for obstacle in self.obstacles)
+        return any(getattr(one, "motion", None) is not None for one in self.obstacles)
 
 
 def settled_state(
@@ -836,10 +836,7 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 
 @kept_by_first
-def _rates_of_trims(automaton: Automaton, cost: StageCost, trims: tuple[Trim, ...]) -> Array:
-    known = _known_rates(automaton, cost)
-    if all(trim in known for trim in trims):
-        return np.array([known[trim] for trim in trims])
+def _rates_of_others(automaton: Automaton, cost: StageCost, trims: tuple[Trim, ...]) -> Array:
     controls = np.array([one.control for one in trims])
     return cost.rates(controls, np.array([one.body_velocity for one in trims]))
 

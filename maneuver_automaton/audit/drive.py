@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,22 +188,22 @@ def _standing(plan: Plan, model: Model) -> DrivenPlan:
 def stated_by(plan: Plan) -> Stated | None:
     """The stretches of a plan, trims whole, maneuvers from sample to sample; None of no time."""
     poses, lengths = plan.switching_poses, plan.primitive_durations
-    lasting = np.flatnonzero(lengths > NOTHING)
+    lasting = (lengths > NOTHING).nonzero()[0]
     rows: list[Stated] = []
     # Trims that follow each other are one run; every maneuver stands alone.
     for _, run in groupby(
         lasting.tolist(), key=lambda k: -1 if isinstance(plan.primitives[k], Trim) else k
     ):
         numbers = list(run)
-        pieces = [plan.primitives[k] for k in numbers]
-        if isinstance(pieces[0], Maneuver):
-            rows.append(_maneuver(pieces[0], numbers[0], poses[numbers[0]]))
+        first, *others = [plan.primitives[k] for k in numbers]
+        if isinstance(first, Maneuver):
+            rows.append(_maneuver(first, numbers[0], poses[numbers[0]]))
             continue
-        trims = [one for one in pieces if isinstance(one, Trim)]
-        controls, twists = ([one.control for one in trims], [one.body_velocity for one in trims])
-        states, which = np.array([one.reduced_state for one in trims]), np.array(numbers)
-        known = states, states, poses[which + 1], np.array(twists), which
-        rows.append(Stated(lengths[which], np.array(controls), *known))
+        trims: list[Any] = [first, *others]
+        controls, which = np.array([one.control for one in trims]), np.array(numbers)
+        states = np.array([one.reduced_state for one in trims])
+        known = states, states, poses[which + 1], plan.twists[which], which
+        rows.append(Stated(lengths[which], controls, *known))
     if len(rows) < 2:
         return rows[0] if rows else None
     return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import kept_with
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
 from maneuver_automaton.audit.drive import DrivenPlan, driven
@@ -92,15 +92,11 @@ def terminal_error(plan: Plan, goal: Goal) -> TerminalError:
     return distance_to(seen_from(plan, goal).end, goal)
 
 
-@kept_by_first
 def seen_from(plan: Plan, goal: Goal) -> Plan:
     """The plan with the goal's place as origin and from time 0: no digit is lost."""
-    start = np.array(plan.start)
-    places = [0, 1, *range(3, start.size)]
-    start[places] -= goal.pose[places]
-    if not plan.maneuvers:
-        return Plan.of_parts(start, plan.trims, plan.durations.tolist(), start_time=0.0)
-    return plan.begun_at(start, start_time=0.0)
+    start = plan.start - goal.pose
+    start[2] = plan.start[2]
+    return kept_with(plan, goal, lambda: plan.begun_at(start, start_time=0.0))
 
 
 def distance_to(end: Array, goal: Goal) -> TerminalError:
@@ -175,9 +171,7 @@ def audit_plan(
         the true one. None without obstacles.
     """
     near = seen_from(plan, goal)
-    turned = sum(
-        abs(float(t.body_velocity[2])) * d for t, d in zip(near.trims, near.durations, strict=True)
-    )
+    turned = float(np.abs(near.twists[:, 2]) @ near.primitive_durations)
     if turned > MOST_TURNED:
         missed = distance_to(near.end, goal)
         return Audit(
@@ -352,13 +346,14 @@ def _body(
     height: tuple[float, float],
 ) -> AuditedBody:
     """A body in the coordinates of obstacles counted from the goal's neighbourhood."""
+    origin, (x, y, _, *higher) = origin_of(goal.pose), goal.pose.tolist()
     return AuditedBody(
         outline=body_outline(shapes),
         frames=frames,
-        offset=complex(*(goal.pose[:2] - origin_of(goal.pose))),
+        offset=complex(x - origin[0], y - origin[1]),
         doubt=frames.doubt(),
         height=height,
-        base=sum(goal.pose[3:].tolist(), 0.0),
+        base=sum(higher, 0.0),
         clock=plan.start_time,
     )
 
@@ -381,12 +376,11 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
         if not names:
             continue
         excess = np.maximum(values.max(axis=0) - limits[:, 1], limits[:, 0] - values.min(axis=0))
-        for k in np.flatnonzero(excess > LIMIT_TOLERANCE).tolist():
-            low, high = limits[k].tolist()
+        for name, over, (low, high) in zip(names, excess.tolist(), limits.tolist(), strict=True):
             size = max([1.0, *(abs(limit) for limit in (low, high) if math.isfinite(limit))])
-            if excess[k] > LIMIT_TOLERANCE * size:
+            if over > LIMIT_TOLERANCE * size:
                 beyond = f"beyond its limits [{low:.6g}, {high:.6g}]"
-                reasons.append(f"{names[k]} is {excess[k]:.3g} {beyond}")
+                reasons.append(f"{name} is {over:.3g} {beyond}")
     limit = getattr(model, "max_lateral_acceleration", None)
     if limit is not None:
         spans, _ = drive.between_samples()

@@ -285,8 +285,8 @@ def origin_of(place: ArrayLike) -> tuple[float, float]:
     >>> origin_of([3.0, -4.0]), origin_of([1e9 + 5.0, 0.0])
     ((0.0, 0.0), (1000013824.0, 0.0))
     """
-    x, y = (GRID * round(float(one) / GRID) for one in np.asarray(place)[:2])
-    return x, y
+    x, y, *_ = np.asarray(place).tolist()
+    return GRID * round(x / GRID), GRID * round(y / GRID)
 
 
 def surroundings_around(
@@ -301,7 +301,7 @@ def surroundings_around(
     """
     motions: list[Motion] = []
     present: list[tuple[float, float]] = []
-    heights = np.tile([-math.inf, math.inf], (len(obstacles), 1))
+    heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
     number = np.full(len(obstacles), -1)
     for k, one in enumerate(obstacles):
         if isinstance(one, Obstacle) and one.height is not None:
@@ -315,7 +315,7 @@ def surroundings_around(
     whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights[owners]
     still, moving = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
-    knots = Knots.of(motions)
+    knots = Knots.of(motions) if motions else NO_KNOTS
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == k) for k in range(len(motions)))
     movers = MovingEdges(
@@ -342,6 +342,7 @@ def surroundings_around(
     )
 
 
+NO_KNOTS = Knots.of(())
 surroundings_of = functools.lru_cache(maxsize=8)(surroundings_around)  # those of the last maps
 
 

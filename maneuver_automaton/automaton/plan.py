@@ -226,10 +226,12 @@ class Plan(Played):
         >>> plan.begun_at([0.0, 5.0, np.pi], start_time=1.0).end.round(9).tolist()
         [-2.0, 5.0, 3.141592654]
         """
-        other = replace(self, start=as_array("start", start), start_time=start_time)
-        for name in ("_pieces", "_steps", "_twists", "primitives", "primitive_durations"):
-            if name in vars(self) and other.start.size == self.start.size:
-                vars(other)[name] = vars(self)[name]
+        other: Plan = object.__new__(Plan)
+        placed = ("_kept", "switching_times", "switching_poses")
+        known = {name: one for name, one in vars(self).items() if name not in placed}
+        vars(other).update(known, start=start, start_time=start_time)
+        plain_numbers(other)
+        freeze(other, "start", last=self.start.size)
         return other
 
     @property
@@ -254,7 +256,7 @@ class Plan(Played):
         if not self.primitives:
             return self.start[None].copy()
         if not (any(self.maneuvers) or "_steps" in vars(self)):
-            return coasted(self.start, self._twists, self.primitive_durations)
+            return coasted(self.start, self.twists, self.primitive_durations)
         return chained(self.start, self._steps)
 
     @property
@@ -302,7 +304,7 @@ class Plan(Played):
     @cached_property
     def _steps(self) -> Array:
         """Motion (m, dof) of every primitive, seen from where it begins."""
-        steps = group_of(self.start.size).exp(self.primitive_durations[:, None] * self._twists).pose
+        steps = group_of(self.start.size).exp(self.primitive_durations[:, None] * self.twists).pose
         steps = steps.copy()
         for k, primitive in enumerate(self.primitives):
             if isinstance(primitive, Maneuver):
@@ -310,10 +312,10 @@ class Plan(Played):
         return steps
 
     @cached_property
-    def _twists(self) -> Array:
+    def twists(self) -> Array:
         """Twist (m, dof) of every trim; zero for maneuvers."""
         still = np.zeros(self.start.size)
-        rows = [p.body_velocity if isinstance(p, Trim) else still for p in self.primitives]
+        rows = [getattr(one, "body_velocity", still) for one in self.primitives]
         return np.array(rows).reshape(-1, self.start.size)
 
     @property
@@ -340,7 +342,7 @@ class Plan(Played):
         index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
-        steps = np.array(begin.exp(since[..., None] * self._twists[index]).pose)
+        steps = np.array(begin.exp(since[..., None] * self.twists[index]).pose)
         for k, primitive in enumerate(self.primitives):
             if isinstance(primitive, Maneuver) and (here := index == k).any():
                 steps[here] = _within(primitive, since[here])

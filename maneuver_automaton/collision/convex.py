@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -55,7 +55,7 @@ def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[list[tuple[Array
             pierced += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
     boxes = _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
     discs = [shape for shape in shapes if isinstance(shape, Disc)]
-    centers = seen_from(np.array([disc.center for disc in discs]).reshape(-1, 1, 2), frame)
+    centers = seen_from(np.array([one.center[None] for one in discs]), frame) if discs else ()
     rounded = [(one, disc.radius) for one, disc in zip(centers, discs, strict=True)]
     return [plain, pierced, boxes, rounded]
 
@@ -105,9 +105,9 @@ def _box_pieces(boxes: list[Box], frame: Array) -> list[tuple[Array, float]]:
     center = seen_from(np.array([box.center for box in boxes]), frame)
     half = 0.5 * np.array([box.size for box in boxes])
     heading = np.array([box.heading for box in boxes]) - frame[2]
-    along = half[:, :1] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    aside = half[:, 1:] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    rings = np.stack([-along - aside, along - aside, along + aside, aside - along], axis=1)
+    c, s = np.cos(heading), np.sin(heading)
+    along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
+    rings = np.array([-along - aside, along - aside, along + aside, aside - along]).swapaxes(0, 1)
     return [(ring, 0.0) for ring in np.round(rings + center[:, None], DIGITS)]
 
 
@@ -128,17 +128,17 @@ def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
     single = np.repeat(counts == 1, counts)
     if not (length[~single] > 0.0).all():  # corners that rounding has made one
         return solids_of(_without_repeats(ring, by) for ring, by in zip(rings, radius, strict=True))
-    normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.where(single, 1.0, length)[:, None]
+    normal = edge[:, ::-1] * (1.0, -1.0) / np.where(single, 1.0, length)[:, None]
     low = np.minimum.reduceat(corners, first[:-1]) - radius[:, None]
     high = np.maximum.reduceat(corners, first[:-1]) + radius[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
-    for k in np.flatnonzero((length < TINY_EDGE) & ~single):  # its normal is rounded, like its ends
+    for k in ((length < TINY_EDGE) & ~single).nonzero()[0]:  # its normal is rounded, like its ends
         piece = int(np.searchsorted(first, k, side="right")) - 1
         offset[k] = (corners[first[piece] : first[piece + 1]] @ normal[k]).max()
     return Solids(
-        edges=np.column_stack([corners, normal, offset]),
+        edges=np.concatenate([corners, normal, offset[:, None]], axis=1),
         first=first,
-        plates=np.column_stack([low, high, radius]),
+        plates=np.concatenate([low, high, radius[:, None]], axis=1),
     )
 
 
@@ -215,7 +215,7 @@ def _first_to_join(
     numbered: dict[int, _Ring], apart: set[tuple[int, int, _Corner]]
 ) -> tuple[int, int, _Ring] | None:
     """The first two neighbours that are convex together, and their ring."""
-    edges = {edge: k for k, ring in numbered.items() for edge in _edges(ring)}
+    edges = {e: k for k, ring in numbered.items() for e in itertools.pairwise([*ring, ring[0]])}
     for (a, b), k in edges.items():
         other = edges.get((b, a), k)
         if other == k or (k, other, a) in apart:
@@ -225,10 +225,6 @@ def _first_to_join(
             return k, other, union
         apart.add((k, other, a))
     return None
-
-
-def _edges(ring: _Ring) -> Iterator[tuple[_Corner, _Corner]]:
-    return zip(ring, ring[1:] + ring[:1], strict=True)
 
 
 def _union(one: _Ring, other: _Ring, a: _Corner, b: _Corner) -> _Ring | None:

@@ -142,7 +142,8 @@ class FclChecker:
     def _seen(self, name: str, poses: ArrayLike) -> Array:
         """Poses counted from the origin; not finite, they would be free in the eyes of FCL."""
         near = np.array(as_array(name, poses, last=3))
-        near[..., :2] -= self.origin
+        if any(self.origin):
+            near[..., :2] -= self.origin
         return near
 
     def _laid_near(self, low: Array, high: Array) -> _Laid:
@@ -418,5 +419,5 @@ def origin_near(place: ArrayLike) -> tuple[float, float]:
 
     The same for all places of a neighbourhood, so that what is prepared for one serves all.
     """
-    x, y = (GRID * round(float(one) / GRID) for one in np.asarray(place)[:2])
-    return x, y
+    x, y, *_ = np.asarray(place).tolist()
+    return GRID * round(x / GRID), GRID * round(y / GRID)

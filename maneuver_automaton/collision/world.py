@@ -150,8 +150,10 @@ def _static_arrays(
 ) -> tuple[Solids, Buckets, Field]:
     """The static obstacles around a footprint: the same beside any moving ones."""
     body, pose = body_of(footprint), np.array(frame)
-    place, turn = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0.0, 0.0, -pose[2]]))
-    maps = [one.moved(place).moved(turn) for one in static if isinstance(one, OccupancyMap)]
+    maps = [one for one in static if isinstance(one, OccupancyMap)]
+    if maps:
+        place, turn = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0, 0, -pose[2]]))
+        maps = [one.moved(place).moved(turn) for one in maps]
     # On from the last ones that were begun anew, if these are the first of all.
     last = [] if maps else _last_begun(footprint, frame, keep)
     known = last[0] if last and static[: len(last[0].static)] == last[0].static else NOTHING_BEGUN

@@ -57,12 +57,13 @@ def _greatest_speeds(automaton: Automaton) -> tuple[float, float, float]:
     return every, level, climb
 
 
-def _quickest(problem: Problem, goal: Goal) -> float:
-    """Least time [s] to a goal at the model's greatest speeds."""
-    way = goal.pose - problem.start
-    ways = goal.off(problem.start)[0], math.hypot(*way[:2]), float(np.abs(way[3:]).sum())
+def _quickest(problem: Problem, goal: Goal, far: float) -> float:
+    """Least time [s] to a goal that is so far [m], at the model's greatest speeds."""
+    x, y, _, *up = (goal.pose - problem.start).tolist()
+    ways = far, math.hypot(x, y), sum(map(abs, up))
     pairs = zip(ways, _greatest_speeds(problem.automaton), strict=True)
-    return max([0.0, *((far - goal.tolerance_m) / speed for far, speed in pairs if speed > 0.0)])
+    times = ((way - goal.tolerance_m) / speed for way, speed in pairs if speed > 0.0)
+    return float(max(0.0, max(times, default=0.0)))
 
 
 @kept_by_first
@@ -89,10 +90,11 @@ def straight_bound(problem: Problem, goals: Sequence[Goal]) -> float:
     from maneuver_automaton.refinement.stop_and_steer import follows_paths
 
     model, cost = problem.automaton.model, terms_of(problem.cost)
-    straight = min(max(0.0, goal.off(problem.start)[0] - goal.tolerance_m) for goal in goals)
+    far = [(goal, goal.off(problem.start)[0]) for goal in goals]
+    straight = min(max(0.0, off - goal.tolerance_m) for goal, off in far)
     known = 0.0
     if cost:
-        known = cost.time * min(_quickest(problem, goal) for goal in goals)
+        known = cost.time * min(_quickest(problem, goal, off) for goal, off in far)
         known += cost.length * straight
     words = why_not_polished(problem) and not follows_paths(model)
     if words and not problem.has_states:  # all plans are words of the library

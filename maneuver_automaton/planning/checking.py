@@ -103,7 +103,8 @@ def check_plan(
         if refused is not None:
             reason = f"at {refused:.6g} s it is where a place cost does not allow it"
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
-        both = zip(problem.place_costs, problem.bound_place_costs, strict=True)
+        bound = problem.bound_place_costs if prices else ()
+        both = zip(problem.place_costs, bound, strict=True)
         places = StatedPrices(  # the audit has distances of its own
             costs=tuple(one if isinstance(one, Clearance) else known for one, known in both),
             prices=tuple(one.price for one in prices),
@@ -295,7 +296,7 @@ def _courses_within_reach(
     """What may come near a layer before a primitive, and the first maneuver without a course."""
     numbers: list[int] = []
     courses: list[fcl_checker.Course] = []
-    for k, primitive in enumerate(plan.primitives[:before]):
+    for k, primitive in enumerate(plan.primitives[:before] if plan.maneuvers else ()):
         if isinstance(primitive, Trim):
             continue
         course = primitive.course
@@ -313,11 +314,10 @@ def _coasts_within_reach(
 ) -> tuple[IntArray, Array, Array, Array]:
     """The parts of trims in which the altitude is within the margin of a layer."""
     # Numbers of their primitives (m,), starts (m, 3), twists (m, 3) and durations (m,) [s].
-    trims = [(k, one) for k, one in enumerate(plan.primitives) if isinstance(one, Trim)]
-    number = np.array([k for k, _ in trims], dtype=np.int64)
-    velocity = np.array([one.body_velocity for _, one in trims]).reshape(-1, plan.start.size)
-    start, lasting = plan.switching_poses[number], plan.primitive_durations[number]
-    first, last = np.zeros(number.size), lasting
+    kinds = [isinstance(one, Trim) for one in plan.primitives] if plan.maneuvers else []
+    number = np.flatnonzero(kinds) if kinds else np.arange(len(plan.trims))
+    velocity, lasting = plan.twists[number], plan.primitive_durations[number]
+    start = plan.switching_poses[number]
     if not (math.isinf(layer.high) or plan.start.size == 3):
         low = layer.low - problem.body_height[1] - problem.margin - start[:, 3]
         high = layer.high - problem.body_height[0] + problem.margin - start[:, 3]
@@ -332,9 +332,9 @@ def _coasts_within_reach(
         kept = np.where(level, within, (meets[1] >= 0.0) & (meets[0] <= lasting))
         number, velocity, start = number[kept], velocity[kept], start[kept]
         first, last = first[kept], last[kept]
-        group = group_of(plan.start.size)
+        group, lasting = group_of(plan.start.size), last - first
         start = (group(start) @ group.exp(first[:, None] * velocity)).pose
-    return number, start[:, :3], velocity[:, :3], last - first
+    return number, start[:, :3], velocity[:, :3], lasting
 
 
 def _rows_within_reach(

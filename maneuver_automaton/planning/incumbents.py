@@ -205,10 +205,9 @@ class Incumbents:
         for fitted in fitted_plans(self.problem, plan, goal, budget=self.for_checks):
             none_fits = False
             lasting = self._with_lasting_coasts(fitted, goal)
-            cost = self.problem.cost_of(fitted)
-            if lasting is not fitted and self._keep(lasting, goal_index, proven=False, cost=cost):
+            if lasting is not fitted and self._keep(lasting, goal_index, fitted, proven=False):
                 return True
-            if self._keep(fitted, goal_index, proven=proven, cost=cost):
+            if self._keep(fitted, goal_index, fitted, proven=proven):
                 return True
         if none_fits and self.for_checks.left_to_check == 0.0:
             self.unchecked += 1
@@ -327,8 +326,8 @@ class Incumbents:
         except TooLate:
             return plan
 
-    def _keep(self, plan: Plan, goal_index: int, *, proven: bool, cost: float) -> bool:
-        """Keep a plan, offered at a `cost`, if it passes; of one motion the cheapest stays."""
+    def _keep(self, plan: Plan, goal_index: int, offered: Plan, *, proven: bool) -> bool:
+        """Keep a plan, `offered` as another, if it passes; of one motion the cheapest stays."""
         begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
         checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.for_checks)
@@ -344,7 +343,7 @@ class Incumbents:
             if self.problem.zones:  # it may keep to them once it is polished
                 self.misfits.append((plan, goal_index))
             return False
-        offered, cost = cost, self.problem.cost_of(plan)
+        cost = self.problem.cost_of(plan)
         # What is shown is final but for cheaper plans: of those with short trims only the first is,
         # and takes no other's place to be.
         shown = self.budget.shows is not None and not self.plans
@@ -353,7 +352,7 @@ class Incumbents:
             goal_index=goal_index,
             cost=cost,
             audit=checked.audit,
-            offered=offered,
+            offered=cost if offered is plan else self.problem.cost_of(offered),
             short=not shown and has_short_coasts(self.problem, plan),
         )
         same = [other for other in self.plans if same_motion(plan, other.plan, self.likeness)]

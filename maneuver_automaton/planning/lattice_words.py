@@ -156,8 +156,7 @@ class LatticeWords(PlanningStep):
         limit = self.limit = found.for_first.stage(share)
         self.alone, ended.finds_plans = not found.plans, known
         if problem.obstacles and not found.plans:
-            last = before_proof(found.for_first)
-            limit = replace(limit, deadline=min(limit.deadline, last.deadline))
+            limit = min(limit, before_proof(found.for_first), key=lambda one: one.deadline)
         word, first = None, None
         if not known and (math.isfinite(query.most_time) or query.library.per_metre == 0.0):
             # where a search by cost alone would look everywhere, or for too long motions
@@ -269,9 +268,8 @@ class LatticeWords(PlanningStep):
 
     def _count(self, search: FirstPlan | WordSearch, **more: int) -> None:
         self.spent += search.expansions
-        self.found.counts.update(expansions=search.expansions, collision_queries=search.queries)
-        if self.finds_plans:
-            self.found.counts.update(more)
+        counts = {"expansions": search.expansions, "collision_queries": search.queries}
+        self.found.counts.update(counts | more if self.finds_plans else counts)
 
     def improved(self) -> list[Candidate]:
         """Plans to be checked, the cheapest first: what was found, and others if asked for."""

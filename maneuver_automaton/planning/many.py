@@ -246,10 +246,7 @@ def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
     return file.getvalue()
 
 
-@functools.lru_cache(maxsize=KNOWN_PLANNERS)
-def _planner_of(common: bytes) -> AnyPlanner | None:
-    planner: AnyPlanner | None = pickle.loads(common)
-    return planner
+_planner_of = functools.lru_cache(maxsize=KNOWN_PLANNERS)(pickle.loads)
 
 
 def _parts_of(one: Any) -> list[object]:

@@ -8,7 +8,6 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from queue import SimpleQueue
-from typing import Any
 
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
@@ -179,14 +178,15 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 
 def load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs: once for all like queries."""
-    ready: set[Any] = kept_with(problem.setting, workspace, set)
-    if problem.ends not in ready:
+    others = problem.setting is not problem  # may follow
+
+    def made() -> bool:
         prepare_steps(problem, workspace)
-        ready.add(problem.ends)
-    if problem.has_states:
-        return  # each question between trims has a search of its own
-    if problem.setting is not problem and uses_lattice(problem):  # others may follow it
-        beginning.prepare_first_call(problem, workspace.prepared)
+        if others and not problem.has_states and uses_lattice(problem):
+            beginning.prepare_first_call(problem, workspace.prepared)
+        return True
+
+    kept_with(problem.setting, (problem.ends, others, workspace), made)
 
 
 def plans(

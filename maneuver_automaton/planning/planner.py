@@ -129,7 +129,7 @@ class Planner:
         """The problem of one query; `start_trim` or `start_state` goes before the planner's own."""
         one = self._between(start, goals, start_time, start_trim, start_state)
         on_the_way: Any = via
-        passes = len(np.atleast_1d(on_the_way)) > 0
+        passes = bool(via) if isinstance(via, tuple) else len(np.atleast_1d(on_the_way)) > 0
         return replace(one, via=on_the_way, order=order) if passes else one
 
     def _between(

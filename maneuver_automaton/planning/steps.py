@@ -42,7 +42,7 @@ from maneuver_automaton.planning.free_space import (
 )
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
-from maneuver_automaton.problem import Problem, between_trims
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement import relaxed_end, stop_and_steer
 from maneuver_automaton.search import beginning
 from maneuver_automaton.search.limits import why_impossible
@@ -200,7 +200,7 @@ def uses_lattice(problem: Problem) -> bool:
     rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
     refused.
     """
-    return _uses_lattice(between_trims(problem).setting)
+    return _uses_lattice(problem.setting)  # whatever its ends
 
 
 @kept_by_first

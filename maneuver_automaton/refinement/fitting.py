@@ -48,7 +48,7 @@ def broken_condition(problem: Problem, plan: Plan) -> str:
     for trim, time in lasting:
         if time < horizon.min_coast - TIME_TOLERANCE and not trim.is_rest:
             return f"trim {trim.name!r} lasts {time:.6g} s, less than {horizon.min_coast:g} s"
-        if time > trim.max_duration + _slack(trim.max_duration):
+        if time > (most := trim.max_duration) and time > most + _slack(most):
             return f"trim {trim.name!r} lasts {time:.6g} s, more than {trim.max_duration:g} s"
     return ""
 

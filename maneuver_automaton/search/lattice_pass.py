@@ -217,26 +217,26 @@ def _with_maneuvers(
     query: LatticeQuery, steps: Sequence[tuple[int, int, float]], end: int
 ) -> list[tuple[int, int, float]]:
     """Steps in the automaton's numbers, with the edges of their transitions; `end` -1: any trim."""
-    library = query.library
-    at = query.start_trim
-    found = [(SWITCH, int(library.trims[at]), 0.0)] if at >= 0 else []
+    arrays, trims = query.library.arrays, query.library.trims
+    at, linked = query.start_trim, len(arrays.edges.cost) > 0
+    found = [(SWITCH, int(trims[at]), 0.0)] if at >= 0 else []
     last = [(NO_EDGE, end, 0.0)] if end >= 0 else []
     for n, (edge, trim, t) in enumerate([*steps, *last]):
-        for link in [edge] if edge >= 0 else _edges_between(library.arrays, at, trim):
-            source = int(library.arrays.edges.source[link])
+        for link in [edge] if edge >= 0 else _edges_between(arrays, at, trim) if linked else ():
+            source = int(arrays.edges.source[link])
             if source != at:
-                found.append((SWITCH, int(library.trims[source]), 0.0))
-            at = int(library.arrays.edges.target[link])
-            found.append((int(library.arrays.edges.maneuver[link]), int(library.trims[at]), 0.0))
+                found.append((SWITCH, int(trims[source]), 0.0))
+            at = int(arrays.edges.target[link])
+            found.append((int(arrays.edges.maneuver[link]), int(trims[at]), 0.0))
         if t > 0.0 or (n == len(steps) and trim != at):
-            found.append((SWITCH, int(library.trims[trim]), t))
+            found.append((SWITCH, int(trims[trim]), t))
             at = trim
     return found
 
 
 def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int]:
     """Edges of the transition between two trims; none within a class, or where there is no trim."""
-    if min(source, target) < 0 or not len(library.edges.cost):
+    if min(source, target) < 0:
         return []
     edges: list[int] = []
     at, goal = (int(library.library.class_of[trim]) for trim in (source, target))

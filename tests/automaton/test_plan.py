@@ -229,3 +229,16 @@ def test_a_maneuver_without_a_course_cannot_be_sampled():
     assert plan.end.tolist() == [2, 0, 0]
     with pytest.raises(ValueError, match=r"^maneuver 'hop': has no course, so it cannot be"):
         plan.sample()
+
+
+def test_a_plan_begun_elsewhere_keeps_what_is_known_of_its_motions_alone():
+    known = plan_of([(AHEAD, 1.0), (LEFT, QUARTER)], start_time=10.0)
+    assert known.switching_times[-1] == 11.0 + QUARTER
+    assert known.switching_poses[-1, 0] > 2.0
+    moved = known.begun_at([5.0, 1.0, 0.3], start_time=2)
+    alone = plan_of([(AHEAD, 1.0), (LEFT, QUARTER)], [5.0, 1.0, 0.3], start_time=2.0)
+    assert moved.twists is known.twists
+    assert moved.switching_times.tolist() == alone.switching_times.tolist()
+    assert moved.switching_poses.tolist() == alone.switching_poses.tolist()
+    with pytest.raises(ValueError, match="start: got shape"):
+        known.begun_at([0.0, 0.0], start_time=0.0)
