@@ -41,6 +41,12 @@ class CompiledLater:
         self._run = made = self._make(self._function)
         return cast("Callable[..., Any]", made)
 
+    @functools.cached_property
+    def only_entry(self) -> Callable[..., Any]:
+        """What numba made of it for the only types that it was called with so far."""
+        (made,) = self.overloads.values()  # which looks at all types: once
+        return cast("Callable[..., Any]", made.entry_point)
+
     def load(self, kinds: str) -> Callable[..., Any] | None:
         """What was compiled for arguments of some kinds, without numba; None: ask numba."""
         with _LOADING:
@@ -184,9 +190,10 @@ def called_again(function: Kernel) -> Kernel:
     """
     if not isinstance(function, CompiledLater):
         return function
-    entries = list(function.loaded.values())
     if "compiled" in vars(function):
-        entries = [one.entry_point for one in function.overloads.values()]
+        entries = [function.only_entry] if len(function.overloads) == 1 else []
+    else:
+        entries = list(function.loaded.values())
     return cast("Kernel", entries[0]) if len(entries) == 1 else function
 
 
