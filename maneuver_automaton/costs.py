@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -115,6 +115,12 @@ def terms_of(cost: StageCost) -> Cost | None:
     """The weights that a cost is the sum of; None if it does not say that it is one."""
     terms: Callable[[], Cost] | None = getattr(cost, "terms", None)
     return None if terms is None else terms()
+
+
+def without_switches(cost: Cost) -> Cost:
+    """The cost without prices of switches; the time in seconds, if nothing else has a price."""
+    driven = any((cost.time, cost.effort, cost.norm, cost.length))
+    return replace(cost, time=cost.time if driven else 1.0, switch=0.0, direction_change=0.0)
 
 
 def check_cost(cost: StageCost) -> None:

@@ -33,6 +33,7 @@ from maneuver_automaton.audit.passages import (
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many
 NEAREST = 64  # pairs that are looked at first
+ROUNDED = 1e-14  # of a time, by which it may be outside of a span whose end it is
 MANY = 256  # pairs at least, of which those that are far are left out first
 
 
@@ -132,9 +133,12 @@ def _crosses(body: AuditedBody, here: _Here, one: Outline) -> NDArray[np.bool_]:
 
 
 def instant(body: AuditedBody, around: Surroundings, time: float) -> EdgePairs:
-    """All edges that are there at a time [s] since the start."""
+    """All edges that are there at a time [s] since the start, but for rounding."""
     first, last = around.movers.present.T - body.clock
-    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.movers.edges]]
+    late = ROUNDED * (1.0 + abs(time) + abs(body.clock))
+    there = ((first - late <= time) & (time <= last + late))[
+        around.motion_of_edge[around.movers.edges]
+    ]
     moving = around.movers.edges[there]
     edge = np.concatenate([around.still, moving])
     places = places_of(body, spans_within(body, time, time))

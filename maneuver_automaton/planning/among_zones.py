@@ -136,7 +136,10 @@ def _questions(problem: Problem) -> Iterator[Problem]:
     model, choices = problem.automaton.model, list[list[bool]]()
     for zone in problem.zones:  # what admits no motion is not entered, what an end is in, is
         moving = (trim for trim in problem.automaton.trims if not trim.is_rest)
-        may = bool(model.reduced_names) or any(piece_is_admitted(zone, one) for one in moving)
+        driven = bool(model.reduced_names) and (
+            zone.max_speed is None or zone.max_speed > _slowest(model)
+        )
+        may = driven or any(piece_is_admitted(zone, one) for one in moving)
         alone = replace(problem, zones=(), obstacles=(Obstacle(zone.shape),))
         must = may and blocked_ends(alone) is not None
         choices.append([True] * may + [False] * (not must))
@@ -193,14 +196,19 @@ def _limited(model: Model, zone: Zone) -> Model:
     """A vehicle with inertia that keeps to a zone's limits, as far as its class states them."""
     known: set[str] = {field.name for field in fields(model)} if is_dataclass(model) else set()
     changes: dict[str, Any] = {}
-    if zone.max_speed is not None and "max_speed" in known:
+    if zone.max_speed is not None and zone.max_speed > _slowest(model) and "max_speed" in known:
         changes["max_speed"] = min(zone.max_speed, model.max_speed)  # type: ignore[attr-defined]
     most = zone.max_lateral_acceleration
     if most and "max_lateral_acceleration" in known:
         changes["max_lateral_acceleration"] = min(most, lateral_limit(model))
     if not zone.reverse and "min_speed" in known:
-        changes["min_speed"] = 0.0
+        changes["min_speed"] = _slowest(model)
     return replace(model, **changes) if changes else model  # type: ignore[type-var]
+
+
+def _slowest(model: Model) -> float:
+    """The least speed ahead [m/s], of a vehicle whose class states one; otherwise 0."""
+    return max(0.0, getattr(model, "min_speed", None) or 0.0)
 
 
 def quickened(problem: Problem, plan: Plan) -> Plan | None:

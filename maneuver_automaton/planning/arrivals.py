@@ -217,8 +217,8 @@ def _trims(problem: Problem, via: Via) -> list[str | None]:
     def speed(trim: Trim) -> float:
         return float(np.linalg.norm(trim.body_velocity[[0, 1, *range(3, problem.start.size)]]))
 
-    ahead = sorted((one for one in straight if one.body_velocity[0] >= 0.0), key=speed)
-    few = ahead[:: -max(1, math.ceil(len(ahead) / MOST_SPEEDS))]
+    ahead = [one for one in straight if one.body_velocity[0] >= 0.0] or straight
+    few = sorted(ahead, key=speed)[:: -max(1, math.ceil(len(ahead) / MOST_SPEEDS))]
     rest: list[str | None] = [None] if automaton.rest is not None else []
     return rest + [trim.name for trim in few]
 

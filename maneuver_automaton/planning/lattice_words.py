@@ -19,7 +19,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc, Obstacle
-from maneuver_automaton.costs import prices_switches, terms_of
+from maneuver_automaton.costs import prices_switches, terms_of, without_switches
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.cheap_ground import with_cheapest_way_left
@@ -410,7 +410,7 @@ def _steered_freely(problem: Problem) -> Problem | None:
     if 0.0 < getattr(automaton.model, "steering_at_rest", 0.0) < math.inf:
         automaton = _without_price_at_rest(automaton)
     if automaton.maneuvers and terms is not None and prices_switches(terms):
-        cost = replace(terms, switch=0.0, direction_change=0.0)
+        cost = without_switches(terms)
     free = automaton is problem.automaton and cost is problem.cost
     return None if free else replace(problem, automaton=automaton, cost=cost)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost, StageCost, terms_of
+from maneuver_automaton.costs import Cost, StageCost, terms_of, without_switches
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
@@ -108,16 +108,11 @@ def polished_price(problem: Problem) -> PolishedPrice:
     rest = problem.automaton.rest
     pads = problem.horizon.time is not None and rest is not None and rests_at_an_end(problem)
     waiting = float(problem.rates[rest]) if pads and rest is not None else 0.0
-    counted = cost.switch > 0.0 or cost.direction_change > 0.0
-    per_second = (cost.time, cost.effort, cost.norm, cost.length)
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is None and prices_metres_alone(cost):
         # lengths are the same at any pace: a little for the time tells the solver which
         cost = replace(cost, time=HURRY * float(problem.rates.max()))
-    if counted:
-        time = cost.time if any(per_second) else 1.0
-        cost = replace(cost, time=time, switch=0.0, direction_change=0.0)
-    return PolishedPrice(problem, cost, waiting)
+    return PolishedPrice(problem, without_switches(cost), waiting)
 
 
 def prices_metres_alone(cost: StageCost) -> bool:
@@ -135,7 +130,8 @@ def admitted_durations(problem: Problem) -> tuple[float, float]:
         return LEAST_DURATION, MOST_DURATION
     if problem.horizon.time is not None and not rests_at_an_end(problem):
         return longest, longest
-    return min(LEAST_DURATION, longest), longest * (1.0 - EARLY)
+    longest *= 1.0 - EARLY
+    return min(LEAST_DURATION, longest), longest
 
 
 def rests_at_an_end(problem: Problem) -> bool:

@@ -128,7 +128,7 @@ def paced(query: LatticeQuery, word: Word) -> tuple[LatticeQuery, Word]:
     if driven is None or not moves.all():
         return query, word
     other = query.word_of([(SWITCH, int(known.trims[k]), t) for k, t in driven], word.goal)
-    keeps = other.duration <= query.most_time and other.durations.min() >= query.least_coast
+    keeps = other.duration <= query.most_time and (other.durations >= query.least_coast).all()
     few = query.most_trims == 0 or len(other.trims) <= query.most_trims
     cheaper = keeps and few and other.cost < word.cost and is_free(query, other)
     return query, other if cheaper else word
@@ -266,7 +266,7 @@ class _Work:
         found = replace(found, cost=self._cost(found))
         if not found.cost < self.word.cost * (1.0 - GAIN) or found.duration > query.most_time:
             return None
-        if 0 < query.most_trims < len(found.trims) or found.durations.min() < query.least_coast:
+        if 0 < query.most_trims < len(found.trims) or (found.durations < query.least_coast).any():
             return None
         if not np.isin(found.trims, query.library.trims).all():
             query = with_trims(query, Chosen(words=(), others=tuple(found.trims.tolist())))

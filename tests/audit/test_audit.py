@@ -386,6 +386,20 @@ def test_only_the_time_that_is_asked_for_counts(within, time, distance):
     assert least.time == pytest.approx(time, abs=0.05)
 
 
+@pytest.mark.parametrize(("first", "since"), [(0.57, 1.97), (0.92, 1.99), (0.66, 1.64)])
+def test_what_appears_in_the_body_is_hit_as_it_appears(first, since):
+    """Here the stretch that begins then begins a rounding earlier."""
+    trims = tuple(
+        Trim(name=str(rate), body_velocity=[1.0, 0.0, rate], control=[1.0, rate])
+        for rate in (0.0, 0.5)
+    )
+    plan = Plan([0.0, 0.0, 0.0], trims, durations=[first, 3.0])
+    post = (Obstacle(Disc(0.5, plan.pose_at(since)[:2]), present_s=(since, 9.0)),)
+    least = closest_to(plan, ROBOT.model, post, footprint=(Disc(0.3),))
+    assert (least.distance, least.obstacle) == (0.0, 0)
+    assert least.time == pytest.approx(since)
+
+
 def test_all_that_is_wrong_is_said():
     crate = Obstacle(Box([1.0, 1.0], center=[5.0, 0.0]), name="crate")
     wrong = Goal(pose=np.add(AHEAD.end, [0.0, 1.0, 0.0]))

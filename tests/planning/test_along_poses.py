@@ -202,6 +202,20 @@ def test_with_inertia_it_passes_in_motion_or_stops():
     assert 2.0 in stays.plan.durations
 
 
+def test_with_inertia_backwards_alone():
+    car = ma.load_stock_library("second_order_car")
+    back = [one for one in car.trims if one.reduced_state[0] == -1.0]
+    names = {one.name for one in back}
+    joins = [one for one in car.maneuvers if {one.source, one.target} <= names]
+    trim = "speed -1, steering 0"
+    problem = ma.Problem(
+        ma.Automaton(car.model, back, joins), [0, 0, 0], ma.Goal([-20, 0, 0], trim=trim),
+        start_trim=trim, via=ma.Via([-8, 0], free_heading=True, tolerance_m=1.0),
+        search=ma.SearchSettings(polish=False),
+    )  # fmt: skip
+    assert planned(problem).plan.word == (trim,)
+
+
 def test_in_space():
     controls = {"on": (1, 0, 0), "left": (1, 1, 0), "right": (1, -1, 0), "up": (1, 0, 0.5)}
     controls["down"] = (1, 0, -0.5)

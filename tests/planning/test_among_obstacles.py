@@ -16,9 +16,11 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyM
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle, UserModel
+from maneuver_automaton.places import Ground
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from tests import scenes
+from tests.matrix.vehicles import VEHICLES
 from tests.quickly import quick_are
 from tests.solids import check_plan
 
@@ -320,6 +322,18 @@ def test_too_little_time_is_named():
     result = planned(problem)
     assert result.status is PlanStatus.UNREACHABLE
     assert result.reason.startswith("the goal cannot be reached in 2 s: way and turn alone take at")
+
+
+@pytest.mark.parametrize("place_costs", [(), Ground(Box([1.0, 1.0]), 3.0)])
+def test_a_start_that_is_the_goal_takes_no_time_of_a_large_library(place_costs):
+    robot = VEHICLES["four_wheel_steering_car"]
+    problem = robot.problem(
+        goals=np.zeros(3),
+        obstacles=Disc(0.5, [3.0, 0.0]),
+        horizon=Horizon(max_time=1.0),
+        place_costs=place_costs,
+    )
+    assert found(problem).plan.word == ()
 
 
 def test_a_library_that_cannot_turn():

@@ -17,6 +17,7 @@ from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
+from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import SLOW_AND_FAST, compiled_only, robot
 
 pytestmark = compiled_only
@@ -123,6 +124,15 @@ def test_maneuvers_keep_to_zones_too():
     slow = Zone(shape=Box([0.6, 4.0], [0.0, 0.0]), max_speed=1.0)
     problem = posed([4.0, 0.0, 0.0], slow, automaton=automaton)
     assert check_plan(problem, found, problem.goals[0]).passed
+
+
+@pytest.mark.parametrize("name", ["hovercraft", "single_track"])
+@pytest.mark.parametrize("limits", [{"max_speed": 0.0}, {"max_speed": 1.0}, {"reverse": False}])
+def test_a_vehicle_that_no_zone_can_limit_so_far_goes_around(name, limits):
+    vehicle = VEHICLES[name]
+    zone = Zone(shape=Box([1.0, 1.0], [0.5 * vehicle.reach, 0.3 * vehicle.reach]), **limits)
+    search = SearchSettings(max_expansions=200, polish=False)
+    assert plan(vehicle.problem(zones=[zone], search=search), time_limit=LIMIT).plan is not None
 
 
 def test_what_a_zone_admits_of_an_automaton():

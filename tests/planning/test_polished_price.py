@@ -32,6 +32,13 @@ def test_prices_of_switches_are_left_out():
     assert (price.cost.time, price.cost.switch, price.cost.direction_change) == (2.0, 0.0, 0.0)
 
 
+@compiled_only
+@pytest.mark.parametrize("priced", ["switch", "direction_change"])
+def test_switches_alone_may_have_a_price(priced):
+    search = SearchSettings(max_expansions=100, polish=False)
+    assert plan(posed(cost=Cost(**{priced: 1.0}), search=search), time_limit=600.0).cost <= 6.0
+
+
 @pytest.mark.parametrize("order", [1.0, 2.0])
 def test_a_norm_is_priced_nearly(order):
     problem = posed(cost=Cost(norm=3.0, time=2.0, norm_order=order))
@@ -54,6 +61,8 @@ def test_a_longest_time_bounds_what_is_polished():
     )
     least, most = admitted_durations(posed(horizon=Horizon(time=7.0)))
     assert least < 1.0 < most <= 7.0
+    least, most = admitted_durations(posed(horizon=Horizon(max_time=1e-3)))
+    assert 0.0 < least <= most < 1e-3
 
 
 def test_effort_alone_has_no_quickest_motion():
