@@ -185,10 +185,11 @@ def stretch_factor(
         raise ValueError("stretch factor: the reference reaches none of the poses")
     ratios = costs[chosen][known] / references[known]
     worst = int(ratios.argmax())
+    x, y, heading = poses[chosen][known][worst]
     return StretchFactor(
         largest=float(ratios[worst]),
         median=float(np.median(ratios)),
-        pose=_shown(poses[chosen][known][worst]),
+        pose=np.array([x, y, wrapped(heading)]),
         pairs=int(known.sum()),
     )
 
@@ -268,11 +269,6 @@ def poses_in_ball(radius: float, count: int, *, seed: int) -> Array:
     distance, angle = radius * np.sqrt(share), 2.0 * np.pi * around
     turn = 2.0 * np.pi * heading - np.pi
     return np.stack([distance * np.cos(angle), distance * np.sin(angle), turn], axis=-1)
-
-
-def _shown(pose: Array) -> Array:
-    """A pose with its heading within half a turn."""
-    return np.append(pose[:2], wrapped(pose[2]))
 
 
 def _at_rest(automaton: Automaton, words: Reached) -> Reached:

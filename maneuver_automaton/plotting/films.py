@@ -33,9 +33,10 @@ from maneuver_automaton.plotting.paths import (
     draw_ends,
 )
 from maneuver_automaton.plotting.pictures import draw_world, plane_entries, see
-from maneuver_automaton.plotting.together import DASHES, HATCH, TINY
+from maneuver_automaton.plotting.together import DASHES, HATCH
 from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.recording import Event, recording_of
+from maneuver_automaton.recording.values import few
 
 FRAMES_PER_SECOND = 15
 MOST_FRAMES = 150  # longer motions are shown faster
@@ -100,7 +101,9 @@ def _gif(film: Film) -> bytes:
     # one palette for all, so that what does not move does not flicker
     samples = np.concatenate([np.asarray(picture(time)) for time in film.samples[:MOST_SAMPLES]])
     palette = Image.fromarray(samples).quantize(colors=PALETTE)
-    palette.putpalette(_with_white(palette.getpalette() or []))
+    colors = np.array(palette.getpalette() or []).reshape(-1, 3)
+    colors[colors.min(axis=1) >= NEARLY_WHITE] = 255  # taking means would make paper grey
+    palette.putpalette([int(channel) for channel in colors.ravel()])
     images = [
         picture(time).quantize(palette=palette, dither=Image.Dither.NONE) for time in film.times
     ]
@@ -110,13 +113,6 @@ def _gif(film: Film) -> bytes:
         stream, format="GIF", save_all=True, append_images=images[1:], duration=lasts, loop=0
     )
     return stream.getvalue()
-
-
-def _with_white(palette: Sequence[int]) -> list[int]:
-    """The palette with white for what is nearly white: taking means would make paper grey."""
-    colors = np.array(palette).reshape(-1, 3)
-    colors[colors.min(axis=1) >= NEARLY_WHITE] = 255
-    return [int(channel) for channel in colors.ravel()]
 
 
 def _video(film: Film) -> bytes:
@@ -208,8 +204,7 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
     bodies = PolyCollection([], linewidths=1.0 if outlined else 0.0, zorder=4.0)
     for part in (old, jumps, ahead, trails, bodies):
         ax.add_collection(part, autolim=False)
-    extent = float(np.ptp(cast.box, axis=0).max())
-    small = [one for one in cast.actors if one.mover.has_plan and one.reach < TINY * extent]
+    small = [one for one in cast.small if one.mover.has_plan]
     dots = ax.scatter([], [], s=18.0, linewidths=0.0, zorder=4.1)
     traffic = still["traffic"]
     shapes = moving_shapes(cast.recording.world.obstacles, fleeting=cast.recording.world.fleeting)
@@ -328,8 +323,7 @@ def _texts_of(events: Sequence[Event], kind: str) -> list[str]:
         return []
     if kind != "exchanged":
         return ["replanned" if kind == "replanned" else "guarantee broken"]
-    more = f" and {len(some) - MOST_SAID} more" if len(some) > MOST_SAID else ""
-    return [f"exchanged: {', '.join(event.text for event in some[:MOST_SAID])}{more}"]
+    return [f"exchanged: {few([event.text for event in some], MOST_SAID)}"]
 
 
 def _draw_still(ax: Any, cast: Cast) -> None:
