@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
-from maneuver_automaton.exports.earth import degrees_of
+from maneuver_automaton.exports.geojson import degrees_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
 

@@ -101,9 +101,7 @@ def _gif(film: Film) -> bytes:
     # one palette for all, so that what does not move does not flicker
     samples = np.concatenate([np.asarray(picture(time)) for time in film.samples[:MOST_SAMPLES]])
     palette = Image.fromarray(samples).quantize(colors=PALETTE)
-    colors = np.array(palette.getpalette() or []).reshape(-1, 3)
-    colors[colors.min(axis=1) >= NEARLY_WHITE] = 255  # taking means would make paper grey
-    palette.putpalette([int(channel) for channel in colors.ravel()])
+    palette.putpalette(_with_white(palette.getpalette() or []))
     images = [
         picture(time).quantize(palette=palette, dither=Image.Dither.NONE) for time in film.times
     ]
@@ -113,6 +111,13 @@ def _gif(film: Film) -> bytes:
         stream, format="GIF", save_all=True, append_images=images[1:], duration=lasts, loop=0
     )
     return stream.getvalue()
+
+
+def _with_white(palette: Sequence[int]) -> list[int]:
+    """The palette with white for what is nearly white: taking means would make paper grey."""
+    colors = np.array(palette).reshape(-1, 3)
+    colors[colors.min(axis=1) >= NEARLY_WHITE] = 255
+    return [int(channel) for channel in colors.ravel()]
 
 
 def _video(film: Film) -> bytes:
