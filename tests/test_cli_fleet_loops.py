@@ -14,7 +14,7 @@ import pytest
 
 from maneuver_automaton.cli import fleets, run
 from maneuver_automaton.fleet import plan_fleet, simulate_fleet
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.formats.fleet_json import load_fleet_loop
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.scenario import load_scenario

@@ -20,8 +20,7 @@ import yaml
 
 from maneuver_automaton.cli import run
 from maneuver_automaton.fleet import plan_fleet, simulate_fleet, verify_driven
-from maneuver_automaton.formats.fleet_json import fleet_to_dict
-from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict
+from maneuver_automaton.formats.fleet_json import fleet_loop_to_dict, fleet_to_dict
 from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text

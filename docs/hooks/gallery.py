@@ -90,8 +90,7 @@ def player_of_value(value: Any, stem: str) -> str:
 def value_of(kept: Path) -> Any:
     """A kept plan or closed loop in its scenario."""
     from maneuver_automaton.formats.closed_loop_json import load_closed_loop
-    from maneuver_automaton.formats.fleet_json import load_fleet
-    from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+    from maneuver_automaton.formats.fleet_json import load_fleet, load_fleet_loop
     from maneuver_automaton.formats.plan_json import load_result
     from maneuver_automaton.scenario import load_scenario
 

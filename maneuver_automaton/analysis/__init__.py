@@ -2,9 +2,12 @@
 
 from maneuver_automaton.analysis.coverage import CoverageSettings as CoverageSettings
 from maneuver_automaton.analysis.coverage import Dispersion as Dispersion
+from maneuver_automaton.analysis.coverage import Reached as Reached
+from maneuver_automaton.analysis.coverage import ReachSettings as ReachSettings
 from maneuver_automaton.analysis.coverage import StretchFactor as StretchFactor
 from maneuver_automaton.analysis.coverage import dispersion as dispersion
 from maneuver_automaton.analysis.coverage import planned as planned
+from maneuver_automaton.analysis.coverage import reached as reached
 from maneuver_automaton.analysis.coverage import settings_for as settings_for
 from maneuver_automaton.analysis.coverage import straight_line as straight_line
 from maneuver_automaton.analysis.coverage import stretch_factor as stretch_factor
@@ -21,9 +24,6 @@ from maneuver_automaton.analysis.growth import unit_cost as unit_cost
 from maneuver_automaton.analysis.library_conditions import LibraryReport as LibraryReport
 from maneuver_automaton.analysis.library_conditions import check_library as check_library
 from maneuver_automaton.analysis.library_conditions import turn_move_turn as turn_move_turn
-from maneuver_automaton.analysis.reach import Reached as Reached
-from maneuver_automaton.analysis.reach import ReachSettings as ReachSettings
-from maneuver_automaton.analysis.reach import reached as reached
 from maneuver_automaton.analysis.shift import ControlProblem as ControlProblem
 from maneuver_automaton.analysis.shift import QuadraticCost as QuadraticCost
 from maneuver_automaton.analysis.shift import (

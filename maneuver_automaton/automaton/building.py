@@ -393,10 +393,8 @@ def _assembled(
             continue
         if pair == original:
             inputs = Inputs(control=entry.control, interval=entry.interval)
-            course, name = (
-                inputs.drive(nodes.model, nodes[pair[0]].reduced_state),
-                " to ".join(pair),
-            )
+            course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
+            name = " to ".join(pair)
             found[pair] = Maneuver.along(course, name=name, source=pair[0], target=pair[1])
             defect = entry.defect
         else:

@@ -123,7 +123,10 @@ def committed(plan: Plan, after: float) -> float:
         return 0.0
     begins = plan.switching_times - plan.start_time
     for k, piece in enumerate(plan.primitives):
-        begun = begins[k] + NOTHING < after or (k == 0 and _starts_within(plan))
+        begun = begins[k] + NOTHING < after
+        if k == 0 and not begun and isinstance(piece, Maneuver):  # it may start within this
+            number = next(n for n, one in enumerate(plan.maneuvers) if one is not None)
+            begun = not same_state(begin_state(plan), plan.trims[number].reduced_state)
         if begun and after < begins[k + 1] - NOTHING and isinstance(piece, Maneuver):
             return float(begins[k + 1] - after)
     return 0.0
@@ -144,13 +147,6 @@ def _end_of_plan(plan: Plan, k: int) -> Array:
     if isinstance(one, Maneuver):
         return plan.trims[k].reduced_state if one.course is None else one.course.reduced_state[k]
     return one.reduced_state
-
-
-def _starts_within(plan: Plan) -> bool:
-    """Whether a plan starts within a maneuver: not in the state of the trim before it."""
-    number = next(k for k, one in enumerate(plan.maneuvers) if one is not None)
-    begun = isinstance(plan.primitives[0], Maneuver)
-    return begun and not same_state(begin_state(plan), plan.trims[number].reduced_state)
 
 
 def joined(first: Plan, second: Plan) -> Plan:
@@ -188,15 +184,9 @@ def _plan(
     return Plan(start, word, durations=times, maneuvers=maneuvers, start_time=start_time)
 
 
-def _course(maneuver: Maneuver) -> Trajectory:
-    if maneuver.course is None:
-        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be cut")
-    return maneuver.course
-
-
 def _cut_at(maneuver: Maneuver, time: float) -> tuple[Trajectory, int]:
     """The course of a maneuver with a sample at a time since its begin [s], and its number."""
-    course = _course(maneuver)
+    course = maneuver.known_course("so it cannot be cut")
     if (k := _sample_at(course, time)) is not None:
         return course, k
     at = np.array([time])
@@ -245,7 +235,7 @@ def _sample_at(course: Trajectory, time: float) -> int | None:
 
 def _sampled(maneuver: Maneuver, since: Array, model: Model) -> Maneuver:
     """The maneuver with samples at times `since` its begin, as the model drives there."""
-    course = _course(maneuver)
+    course = maneuver.known_course("so it cannot be cut")
     new = [
         float(t)
         for t in since
@@ -316,11 +306,8 @@ def _maneuvers(
     maneuvers: Sequence[Maneuver | None], frame: Callable[[Array], LieGroup]
 ) -> tuple[Maneuver | None, ...]:
     """The maneuvers of the part, their displacements seen from where the part begins."""
-    courses: list[Trajectory] = []
-    for one in maneuvers:
-        if one is not None and one.course is None:
-            raise ValueError(f"maneuver {one.name!r}: has no course, so nothing can be carried")
-        courses += [one.course] if one is not None and one.course is not None else []
+    why = "so nothing can be carried"
+    courses = [one.known_course(why) for one in maneuvers if one is not None]
     if not courses:
         return tuple(maneuvers)
     counts = [len(course.time) for course in courses]

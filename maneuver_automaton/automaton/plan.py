@@ -283,9 +283,7 @@ class Plan(Played):
                 poses.append(after)
                 twists.append(primitive.body_velocity[:3])
                 continue
-            course = primitive.course
-            if course is None:
-                raise ValueError(f"maneuver {primitive.name!r}: has no course, so no motion")
+            course = primitive.known_course("so no motion")
             samples = np.array((SE2(here[:3]) @ SE2(course.pose[:, :3])).pose)
             samples[:, 2] = here[2] + course.pose[:, 2]
             scale = lasting / float(course.time[-1])
@@ -391,7 +389,7 @@ class Plan(Played):
         parts = [
             _trim_samples(primitive, duration, max_step_m, max_step_rad)
             if isinstance(primitive, Trim)
-            else _finer(_course(primitive), max_step_m, max_step_rad)
+            else _finer(primitive.known_course("so it cannot be sampled"), max_step_m, max_step_rad)
             for primitive, duration in self._pieces
         ]
         group = group_of(self.start.size)
@@ -467,12 +465,6 @@ def _within(maneuver: Maneuver, since: Array) -> Array:
     group = group_of(maneuver.displacement.size)
     share = since / maneuver.duration if maneuver.duration > 0.0 else np.ones_like(since)
     return group.exp(share[..., None] * group(maneuver.displacement).log()).pose
-
-
-def _course(maneuver: Maneuver) -> Trajectory:
-    if maneuver.course is None:
-        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be sampled")
-    return maneuver.course
 
 
 def _trim_samples(

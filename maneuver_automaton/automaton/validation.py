@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
@@ -197,7 +197,9 @@ def _what_is_missing(automaton: Automaton, trims: IntArray, maneuvers: Sequence[
         return "only sinking and level trims: the height never rises"
     if not (climb < 0.0).any():
         return "only climbing and level trims: the height never falls"
-    if _rank(twists[:, 2:]) < 2:
+    length = np.linalg.norm(twists[:, 2:], axis=1)
+    unit = twists[length > 0.0, 2:] / length[length > 0.0, None]
+    if np.count_nonzero(np.linalg.svd(unit, compute_uv=False) > PARALLEL) < 2:  # one direction
         return "turn rate and climb rate are proportional: height and heading stay coupled"
     return ""
 
@@ -230,10 +232,3 @@ def _has_one_center(automaton: Automaton, trims: IntArray, maneuvers: Sequence[M
     slip_y = twists[:, 1] + twists[:, 2] * known[:, 0]
     pace = np.maximum(np.linalg.norm(twists[:, :2], axis=1), np.abs(twists[:, 2]) * length)
     return bool((np.hypot(slip_x, slip_y) <= PARALLEL * pace).all())
-
-
-def _rank(rows: Array) -> int:
-    """Number of directions that `rows` span, each counted at unit length."""
-    length = np.linalg.norm(rows, axis=1)
-    unit = rows[length > 0.0] / length[length > 0.0, None]
-    return int(np.count_nonzero(np.linalg.svd(unit, compute_uv=False) > PARALLEL))

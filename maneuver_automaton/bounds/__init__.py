@@ -1,11 +1,11 @@
 """What is certain: poses that collide, and that no plan exists."""
 
 from maneuver_automaton.bounds.cells import CostToGo as CostToGo
+from maneuver_automaton.bounds.cells import PoseScene as PoseScene
+from maneuver_automaton.bounds.cells import pose_scene as pose_scene
 from maneuver_automaton.bounds.families import besides as besides
 from maneuver_automaton.bounds.levels import Proof as Proof
 from maneuver_automaton.bounds.levels import cell_proofs as cell_proofs
-from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
-from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
 from maneuver_automaton.bounds.separation import Narrowest as Narrowest
 from maneuver_automaton.bounds.separation import Reachability as Reachability
 from maneuver_automaton.bounds.separation import Separation as Separation

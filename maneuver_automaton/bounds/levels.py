@@ -21,13 +21,14 @@ from maneuver_automaton.bounds.cells import (
     CostToGo,
     Index,
     PoseCells,
+    PoseScene,
     connected,
     finer,
     first_cells,
     on_finer,
+    pose_scene,
 )
 from maneuver_automaton.bounds.families import Motions, motions_of
-from maneuver_automaton.bounds.pose_scene import PoseScene, pose_scene
 from maneuver_automaton.bounds.program import BoundProgram, program_of, raised, slope
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.distance_grid import OCTILE

@@ -145,7 +145,10 @@ def raised(
     single precision; `slope` says how well.
     """
     cells, families, price = program.cells, program.motions.families, program.motions.price
-    base, layer = _filled(program)
+    # First nodes and layers of whole blocks, filled up with the first cell once more.
+    filler = program.layer == program.cells.active.shape[2]
+    base = np.where(filler, program.base[0], program.base).astype(np.int32)
+    layer = np.where(filler, program.layer[0], program.layer).astype(np.int32)
     table, rates = _directions(cells, families, 4)
     single = np.ascontiguousarray(value, dtype=np.float32)
     single = single.copy() if single is value else single
@@ -172,13 +175,6 @@ def raised(
             room[..., 0], room[..., -1] = least, least
         _kernels_ascent.raise_nodes(single.reshape(-1), room.reshape(-1), free, price)
     return single.astype(np.float64)
-
-
-def _filled(program: BoundProgram) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First nodes and layers of whole blocks, filled up with the first cell once more."""
-    filler = program.layer == program.cells.active.shape[2]
-    base = np.where(filler, program.base[0], program.base)
-    return base.astype(np.int32), np.where(filler, program.layer[0], program.layer).astype(np.int32)
 
 
 def _weights(cells: PoseCells, families: Families) -> Array:

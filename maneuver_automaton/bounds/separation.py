@@ -27,7 +27,7 @@ from maneuver_automaton.bounds import _kernels_connectivity
 from maneuver_automaton.bounds._kernels_boxes import UNKNOWN
 from maneuver_automaton.bounds._kernels_connectivity import GOAL, ROUNDED, START
 from maneuver_automaton.bounds.arrays import Cells, Grid
-from maneuver_automaton.bounds.pose_scene import TOUCHING, PoseScene, lasting_obstacles, pose_scene
+from maneuver_automaton.bounds.cells import TOUCHING, PoseScene, lasting_obstacles, pose_scene
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem

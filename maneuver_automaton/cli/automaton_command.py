@@ -21,9 +21,18 @@ from maneuver_automaton.cli.inputs import (
     writing,
 )
 from maneuver_automaton.cli.pictures import LookOptions, ready_to_draw
-from maneuver_automaton.cli.terminal import Advance, console, counted, progress_bar, table, waiting
+from maneuver_automaton.cli.terminal import (
+    Advance,
+    console,
+    counted,
+    progress_bar,
+    say,
+    table,
+    waiting,
+)
 from maneuver_automaton.design import DesignedLibrary, disperse_library
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.recording.values import few
 from maneuver_automaton.scenario import build_file
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
@@ -71,11 +80,10 @@ def _build_maneuvers(
     _print_library(path, built.automaton, quiet=quiet)
     if built.build is not None and not quiet:
         one = built.build
-        console().print(
+        say(
             f"  {one.solved} solved, {one.resumed} from the journal of a build before, "
             f"{one.mirrored} mirror images in {one.build_s:.1f} s; driven again they end "
-            f"{one.worst_defect:.1e} off at most",
-            soft_wrap=True,
+            f"{one.worst_defect:.1e} off at most"
         )
     return NO_PLAN if built.failures else FOUND
 
@@ -83,7 +91,7 @@ def _build_maneuvers(
 def _print_library(path: Path, automaton: Automaton, *, quiet: bool) -> None:
     if not quiet:
         said = f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}"
-        console().print(said, soft_wrap=True)
+        say(said)
 
 
 def show(file: Path, *, coverage: bool, model: str | None) -> int:
@@ -108,13 +116,13 @@ def show(file: Path, *, coverage: bool, model: str | None) -> int:
         _print_more(len(automaton.maneuvers))
     out.print(f"  {its.name}, {_count(automaton)}")
     for line in report_lines(validate(automaton)):
-        out.print(f"  {line}", soft_wrap=True)
+        say(f"  {line}")
     if coverage:
         with waiting("sampling what it covers", quiet=False):
             lines = coverage_lines(automaton)
         for line in lines:
-            out.print(f"  {line}", soft_wrap=True)
-    out.print(f"  hash {automaton_hash(automaton)}", soft_wrap=True)
+            say(f"  {line}")
+    say(f"  hash {automaton_hash(automaton)}")
     return FOUND
 
 
@@ -146,11 +154,11 @@ def draw(file: Path, out: Path, *, look: LookOptions, model: str | None) -> int:
     plotting = ready_to_draw()
     with writing(path):
         plotting.save_automaton_figure(automaton, path, look=look.look(name))
-        console().print(str(path), soft_wrap=True)
+        say(str(path))
         if automaton.maneuvers:
             path = path.with_name(f"{path.stem}_maneuvers{path.suffix}")
             plotting.save_maneuvers_figure(automaton, path, look=look.look(name))
-            console().print(str(path), soft_wrap=True)
+            say(str(path))
     return FOUND
 
 
@@ -183,14 +191,9 @@ def report_lines(report: AutomatonReport) -> list[str]:
         lines.append(f"{len(report.components)} groups of trims out of each other's reach: {sizes}")
     for what, names in (("dead ends", report.dead_ends), ("unused", report.unused)):
         if names:
-            lines.append(f"{what}: {few(names)}")
-    lines += [f"equal twists: {few(names)}" for names in report.duplicates[:10]]
+            lines.append(f"{what}: {few(names, 8)}")
+    lines += [f"equal twists: {few(names, 8)}" for names in report.duplicates[:10]]
     return lines
-
-
-def few(names: tuple[str, ...]) -> str:
-    """Names in a row, the first eight."""
-    return ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
 
 
 def _count(automaton: Automaton) -> str:
@@ -244,11 +247,10 @@ def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bo
     with writing(path):
         save_library(done.automaton, path)
     if not quiet:
-        console().print(
+        say(
             f"{path}: {len(done.automaton.maneuvers)} of {done.maneuvers} maneuvers, hash "
             f"{automaton_hash(done.automaton)}\n  dispersion {done.dispersion:.4g} m, at "
-            f"{done.farthest}; no choice of as many has less than {done.at_least:.4g} m",
-            soft_wrap=True,
+            f"{done.farthest}; no choice of as many has less than {done.at_least:.4g} m"
         )
     return FOUND
 
@@ -262,7 +264,7 @@ def _draw_factor(designed: DesignedLibrary, path: Path, *, quiet: bool) -> None:
     with writing(path):
         plotting.save_factor_figure(designed.words, path)
     if not quiet:
-        console().print(str(path), soft_wrap=True)
+        say(str(path))
 
 
 def _print_designed(path: Path, designed: DesignedLibrary) -> None:
@@ -279,11 +281,10 @@ def _print_designed(path: Path, designed: DesignedLibrary) -> None:
     ]
     out.print(table("", ["", "trim", "twist [m/s, m/s, rad/s]"], chosen, numbers=(0,)))
     for line in _proven(designed):
-        out.print(f"  {line}", soft_wrap=True)
-    out.print(
+        say(f"  {line}")
+    say(
         f"{path}: {size} of {designed.candidates} candidates, "
-        f"hash {automaton_hash(designed.automaton)}",
-        soft_wrap=True,
+        f"hash {automaton_hash(designed.automaton)}"
     )
 
 

@@ -15,7 +15,7 @@ from maneuver_automaton.analysis import SymmetryReport
 from maneuver_automaton.analysis.examine import listed
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
-from maneuver_automaton.cli.automaton_command import few, report_lines
+from maneuver_automaton.cli.automaton_command import report_lines
 from maneuver_automaton.cli.check_plans import Finding
 from maneuver_automaton.cli.check_plans import findings as findings_of_plans
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
@@ -24,10 +24,11 @@ from maneuver_automaton.cli.terminal import announced, console, table, waiting
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.formats.fleet_json import reason_of
-from maneuver_automaton.models import Model, as_stated, rollout, vector_field
+from maneuver_automaton.models import as_stated, rollout, vector_field
 from maneuver_automaton.planning import PlanStatus
 from maneuver_automaton.planning.blocked import where_touched
-from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.recording.values import few
 from maneuver_automaton.scenario import FleetScenario, Scenario
 
 TRIM_SECONDS = 2.0  # how long every trim is driven by the ODE solver
@@ -92,8 +93,15 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
             holds=None,
             words=f"{kind} depends on the place; the vehicle and the rest of its cost do not",
         )
-    if constraint := _constraint(problem.bounds, model):
-        report = analysis.check_constraint(constraint, region=region)
+    bounds = problem.bounds
+    named = (("x", bounds.x), ("y", bounds.y), ("z", bounds.z))
+    pairs = [(model.group.coordinates.index(name), pair) for name, pair in named if pair]
+
+    def excess(state: Array, control: Array) -> Array:
+        return np.array([(low - state[k], state[k] - high) for k, (low, high) in pairs]).ravel()
+
+    if pairs:
+        report = analysis.check_constraint(excess, region=region)
         yield _of_given("bounds", report, hint="they do not move with the problem")
     stated = np.isin(problem.automaton.model.group.coordinates, model.group.coordinates)
     start, goal = problem.start[stated], problem.goals[0].pose[stated]
@@ -142,19 +150,6 @@ def _stage_cost(problem: Problem) -> Callable[[Array, Array], float]:
     return cost
 
 
-def _constraint(bounds: Bounds, model: Model) -> Callable[[Array, Array], Array] | None:
-    """Bounds as ``g(x, u) <= 0``; None where there are none."""
-    named = (("x", bounds.x), ("y", bounds.y), ("z", bounds.z))
-    pairs = [(model.group.coordinates.index(name), pair) for name, pair in named if pair]
-    if not pairs:
-        return None
-
-    def excess(state: Array, control: Array) -> Array:
-        return np.array([(low - state[k], state[k] - high) for k, (low, high) in pairs]).ravel()
-
-    return excess
-
-
 def _automaton(automaton: Automaton) -> Iterator[Finding]:
     yield _trims(automaton)
     report = validate(automaton)
@@ -166,7 +161,7 @@ def _automaton(automaton: Automaton) -> Iterator[Finding]:
         words="every trim can be reached from every trim" if sound else "; ".join(lines[1:]),
     )
     if report.duplicates:
-        words = "; ".join(few(names) for names in report.duplicates[:5])
+        words = "; ".join(few(names, 8) for names in report.duplicates[:5])
         yield Finding(what="automaton: no trim twice", holds=None, words=f"equal twists: {words}")
     yield Finding(
         what="automaton: reaches every pose of free space",
@@ -180,7 +175,13 @@ def _trims(automaton: Automaton) -> Finding:
     model, trims = automaton.model, automaton.trims
     start = np.array([0.3, -0.2, 0.7, 0.1][: model.group.dof])
     states = np.array([np.concatenate([start, trim.reduced_state]) for trim in trims])
-    driven = _states_after(model, states, automaton.controls)
+    field, controls = vector_field(model), automaton.controls
+
+    def rates(state: Array, control: Array) -> Array:  # of all side by side, as one large system
+        return field(state.reshape(states.shape), control.reshape(controls.shape)).ravel()
+
+    ends = rollout(rates, states.ravel(), control=controls.ravel(), times=[0.0, TRIM_SECONDS])
+    driven = ends[-1].reshape(states.shape)
     coasted = model.group.exp(TRIM_SECONDS * automaton.body_velocities)
     expected = (model.group(start) @ coasted).pose
     reduced = states[:, model.group.dof :]
@@ -193,17 +194,6 @@ def _trims(automaton: Automaton) -> Finding:
         words=f"{len(trims)} trims driven for {TRIM_SECONDS:g} s by an ODE solver, "
         f"worst {trims[worst].name!r}",
     )
-
-
-def _states_after(model: Model, states: Array, controls: Array) -> Array:
-    """States after the trims were driven side by side, as one large system."""
-    field = vector_field(model)
-
-    def rates(state: Array, control: Array) -> Array:
-        return field(state.reshape(states.shape), control.reshape(controls.shape)).ravel()
-
-    ends = rollout(rates, states.ravel(), control=controls.ravel(), times=[0.0, TRIM_SECONDS])
-    return np.asarray(ends[-1].reshape(states.shape))
 
 
 def of_ends(problem: Problem) -> Iterator[Finding]:
@@ -264,8 +254,7 @@ def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
     for name, problem in zip(fleet.names, fleet.problems, strict=True):
         kinds.setdefault((id(problem.automaton), id(problem.cost)), {})[name] = problem
     for alike in kinds.values():
-        more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-        names = ", ".join([*alike][:3]) + more
+        names = few([*alike], 3)
         for one in of_vehicle(next(iter(alike.values()))):
             yield one if len(kinds) == 1 else replace(one, what=f"{names}: {one.what}")
     yield from _ends(fleet)

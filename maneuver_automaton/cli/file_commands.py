@@ -8,7 +8,7 @@ import json
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from maneuver_automaton._kernel_list import kernel_names
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
 from maneuver_automaton.cli.inputs import Parts, automaton_of, make_folder, problem_of, writing
-from maneuver_automaton.cli.terminal import console, print_written, table
+from maneuver_automaton.cli.terminal import console, print_written, say, table
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.documents import KINDS, schema_of
@@ -72,7 +72,7 @@ def clear_cache() -> int:
     for folder in folders:
         with writing(folder):
             shutil.rmtree(folder)
-    console().print(f"{size:.1f} MB removed", soft_wrap=True)
+    say(f"{size:.1f} MB removed")
     return FOUND
 
 
@@ -98,17 +98,8 @@ def compile_all(*, jobs: int | None) -> int:
         complain(failure)
     took = time.perf_counter() - began
     line = f"{len(kernel_names()) - len(failed)} kernels are compiled, after {took:.1f} s: "
-    console().print(f"{line}{kernel_folder()}", soft_wrap=True)
+    say(f"{line}{kernel_folder()}")
     return BAD_INPUT if failed else FOUND
-
-
-def scenario_folder() -> Path:
-    """Folder of the scenarios: within an installed package, or beside that of a clone."""
-    package = Path(maneuver_automaton.__file__).parent
-    for folder in (package / "scenarios", package.parent / "scenarios"):
-        if folder.is_dir():
-            return folder
-    raise InvalidScenario(f"example: {package} came without its scenarios; need to install it anew")
 
 
 def _list_scenarios() -> int:
@@ -117,9 +108,7 @@ def _list_scenarios() -> int:
     width = max(map(len, found))
     for name, content in found.items():
         command = "mpc" if "receding_horizon" in content else "plan"
-        console().print(
-            f"{name:<{width}}  {command:<4}  {content['name']}", soft_wrap=True, markup=False
-        )
+        say(f"{name:<{width}}  {command:<4}  {content['name']}")
     return FOUND
 
 
@@ -132,7 +121,11 @@ def example(name: str | None, out: Path | None) -> int:
     if target.is_dir() or (out is not None and not out.suffix):
         target = target / source.name
     copies = [(source, target)]
-    copies += [(source.parent / one, target.parent / one) for one in _named(source)]
+    obstacles = _content(source).get("obstacles")
+    for obstacle in obstacles if isinstance(obstacles, list) else []:
+        if isinstance(name := obstacle.get("map"), str):
+            image = Path(name).parent / str(_content(source.parent / name)["image"])
+            copies += [(source.parent / one, target.parent / one) for one in (name, image)]
     for original, copy in copies:
         if copy.exists() and (copy.is_dir() or copy.read_bytes() != original.read_bytes()):
             raise InvalidScenario(
@@ -144,7 +137,7 @@ def example(name: str | None, out: Path | None) -> int:
             write_bytes_atomically(copy, original.read_bytes())
     command = "mpc" if "receding_horizon" in _content(source) else "plan"
     said = f"{target}: {_content(source)['name']}; next: maneuver-automaton {command} {target}"
-    console().print(said, soft_wrap=True, markup=False)
+    say(said)
     return FOUND
 
 
@@ -161,23 +154,19 @@ def _source(name: str) -> Path:
 
 
 def _scenarios() -> dict[str, Path]:
-    """Files of the scenarios by name, those of one vehicle and those of several."""
-    folder = scenario_folder()
-    return {path.stem: path for path in (*folder.glob("*.yaml"), *folder.glob("fleets/*.yaml"))}
+    """Files of the scenarios by name: within an installed package, or beside that of a clone."""
+    package = Path(maneuver_automaton.__file__).parent
+    for folder in (package / "scenarios", package.parent / "scenarios"):
+        if folder.is_dir():
+            files = (*folder.glob("*.yaml"), *folder.glob("fleets/*.yaml"))
+            return {path.stem: path for path in files}
+    raise InvalidScenario(f"example: {package} came without its scenarios; need to install it anew")
 
 
 def _content(path: Path) -> dict[str, object]:
     value = parse(read_text(path), name=str(path)).value
     assert isinstance(value, dict)  # it is one of ours
     return value
-
-
-def _named(source: Path) -> Iterator[Path]:
-    obstacles = _content(source).get("obstacles")
-    for obstacle in obstacles if isinstance(obstacles, list) else []:
-        if isinstance(name := obstacle.get("map"), str):
-            yield Path(name)
-            yield Path(name).parent / str(_content(source.parent / name)["image"])
 
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
@@ -223,11 +212,11 @@ def _convert_library(source: Path, target: Path, write: Callable[[Automaton, Pat
         raise InvalidLibrary(f"{target}: {error}") from error
     print_written(target)
     if read is not None and read.remark:
-        console().print(f"{source}: {read.remark}", soft_wrap=True)
+        say(f"{source}: {read.remark}")
     name = target.name.lower()
     kept = name.endswith(KEEP_MULTIPLIERS) and not name.endswith(NAV2_JSON)
     if not kept and any(one.cost_multiplier != 1.0 for one in automaton.maneuvers):
-        console().print(f"{target}: cost multipliers are left out", soft_wrap=True)
+        say(f"{target}: cost multipliers are left out")
     return FOUND
 
 

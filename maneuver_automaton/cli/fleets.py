@@ -18,8 +18,12 @@ from maneuver_automaton.fleet import (
     verify_driven,
 )
 from maneuver_automaton.fleet.held import fleet_with_room, tube_of
-from maneuver_automaton.formats.fleet_json import fleet_to_dict, reason_of
-from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict, load_fleet_loop
+from maneuver_automaton.formats.fleet_json import (
+    fleet_loop_to_dict,
+    fleet_to_dict,
+    load_fleet_loop,
+    reason_of,
+)
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.recording.fleets import judged_facts
 from maneuver_automaton.scenario import FleetScenario
@@ -110,7 +114,7 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
     if seed is None:
         seed = 0 if part.disturbance is None else part.disturbance.seed
     log = None if options.resume is None else load_fleet_loop(options.resume, scenario.fleet)
-    first = _first_plans(job, scenario) if log is None else None
+    first = _first_plans(job, scenario, part.tube_m) if log is None else None
     named = naming(job.path, "receding_horizon: ")
     with progress_bar("steps", steps, quiet=options.quiet) as advance, named:
         return simulate_fleet(
@@ -133,17 +137,16 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
         )
 
 
-def _first_plans(job: Job, scenario: FleetScenario) -> FleetResult | None:
+def _first_plans(job: Job, scenario: FleetScenario, tube_m: float | None) -> FleetResult | None:
     """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
-    part, fleet = scenario.receding_horizon, scenario.fleet
-    assert part is not None
+    fleet = scenario.fleet
     there = [name for name in fleet.names if name not in scenario.joins_s]
     if not there:
         return None
     limit = scenario.time_limit_s
     with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet):
         return plan_fleet(
-            fleet_with_room(fleet.only(there), tube_of(fleet, part.tube_m)),
+            fleet_with_room(fleet.only(there), tube_of(fleet, tube_m)),
             time_limit=limit,
             objective=scenario.settings.objective,
             orders=scenario.settings.orders,

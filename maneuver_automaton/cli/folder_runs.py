@@ -15,7 +15,7 @@ from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import check_scheduler, in_parallel
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, writing
-from maneuver_automaton.cli.terminal import console, progress_bar, table
+from maneuver_automaton.cli.terminal import console, progress_bar, say, table
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.movingai import map_beside
 from maneuver_automaton.formats.registry import (
@@ -79,7 +79,7 @@ def run_folder(
     if jobs > 1 and scheduler is None:
         ready()
     if rows and not quiet:
-        _say(f"{len(rows)} of {len(problems)} were done by a run before")
+        say(f"{len(rows)} of {len(problems)} were done by a run before")
     with writing(out):
         kept = contextlib.ExitStack()
         write = kept.enter_context(journal(out / JOURNAL))
@@ -90,7 +90,7 @@ def run_folder(
                 write([json.dumps({"key": keys[path], **asdict(row)})])
             if not quiet and len(problems) > 1:
                 cost = "" if row.cost is None else f", cost {row.cost:.6g}"
-                _say(f"{row.name}: {row.status}{cost}")
+                say(f"{row.name}: {row.status}{cost}")
             advance()
     if not stopped():
         (out / JOURNAL).unlink(missing_ok=True)
@@ -139,10 +139,6 @@ def _kept(out: Path, keys: dict[Path, str]) -> dict[Path, Row]:
     return {path: known[key] for path, key in keys.items() if key in known}
 
 
-def _say(line: str) -> None:
-    console().print(line, soft_wrap=True, markup=False)
-
-
 def _print_rows(rows: Sequence[Row]) -> None:
     def shown(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}g}"
@@ -169,9 +165,12 @@ def problems_in(folder: Path, parts: Parts) -> list[tuple[Path, Parts]]:
     names, models, outlines of robots, the scenario of --with. A scenario states all of its
     problem, and only formats with several problems need to know which one.
     """
-    documents = {
-        path: _document(path) for path in _files(folder) if path.suffix.lower() in YAML_ENDINGS
-    }
+    documents: dict[Path, Document | None] = {}  # None: it cannot be read, told when it is planned
+    for path in (one for one in _files(folder) if one.suffix.lower() in YAML_ENDINGS):
+        try:
+            documents[path] = parse(read_text(path), name=str(path))
+        except InvalidScenario:
+            documents[path] = None
     used = set(_used(folder, documents))
     if parts.beside is not None:
         used.add(parts.beside.resolve())
@@ -201,14 +200,6 @@ def _files(folder: Path) -> list[Path]:
     except OSError as error:
         raise InvalidScenario(f"{folder}: cannot be read: {error.strerror}") from error
     return [path for path in inside if path.is_file() and not path.name.startswith(".")]
-
-
-def _document(path: Path) -> Document | None:
-    """Document of a YAML file; None if it cannot be read, which is told when it is planned."""
-    try:
-        return parse(read_text(path), name=str(path))
-    except InvalidScenario:
-        return None
 
 
 def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path]:

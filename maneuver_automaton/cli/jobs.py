@@ -25,7 +25,7 @@ from maneuver_automaton.cli.inputs import (
     writing,
 )
 from maneuver_automaton.cli.pictures import Draughtsman, draw
-from maneuver_automaton.cli.terminal import announced, console, print_result
+from maneuver_automaton.cli.terminal import announced, print_result, say
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import write_document
 from maneuver_automaton.formats.registry import is_road
@@ -73,7 +73,7 @@ class JobResult:
         tables = [] if self.result is None else tables_of(self.result, *self.measured)
         print_result(self.name, tables, (*self.all_facts, Fact(label="written to", value=folder)))
         for line in self.remarks:
-            console().print(f"  {line}", soft_wrap=True)
+            say(f"  {line}")
 
     def row(self, path: Path, *, known: bool) -> folder_runs.Row:
         """For the table of a folder; with its numbers, if they are `known`."""

@@ -14,7 +14,7 @@ from maneuver_automaton.cli.inputs import Parts, make_folder, naming, opened, us
 from maneuver_automaton.cli.pictures import LookOptions, ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.exports.earth import degrees_of
+from maneuver_automaton.exports.geojson import degrees_of
 from maneuver_automaton.formats.closed_loop_json import driven_document
 from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.plan_json import plan_of_document
@@ -119,8 +119,16 @@ def plot(file: Path, out: Path | None, *, look: LookOptions, beside: Path | None
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if look.animate else "page" if look.html else "picture"
     path = _picture_target(file, out, what)
+    result: Any
     with errors_at(file):
-        result, name = _result_of(file, beside)
+        found, name = opened(file, Parts(beside=beside)), ""
+        if found.beside is None and not found.several:  # nobody says in which world it was made
+            result = (
+                driven_document(found.document) if "steps" in found.document else found.document
+            )
+        else:
+            result = found.result()
+            name = result.name if found.scenario is None else found.scenario.name
     make_folder(path.parent)
     with writing(path), errors_at(file):
         if isinstance(result, dict):
@@ -135,16 +143,6 @@ def plot(file: Path, out: Path | None, *, look: LookOptions, beside: Path | None
             save_film(recording_of(result), path, look.look(name))
     print_written(path)
     return FOUND
-
-
-def _result_of(file: Path, beside: Path | None) -> tuple[Any, str]:
-    """What a file holds, in the world that it was made for, and its name; else the document."""
-    found = opened(file, Parts(beside=beside))
-    if found.beside is None and not found.several:
-        document = found.document
-        return (driven_document(document) if "steps" in document else document), ""
-    result = found.result()
-    return result, result.name if found.scenario is None else found.scenario.name
 
 
 def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:

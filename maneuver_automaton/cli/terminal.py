@@ -64,22 +64,14 @@ def table(
     return made
 
 
+def say(line: str) -> None:
+    """Print a line as it is, however long."""
+    console().print(line, soft_wrap=True)
+
+
 def print_written(*paths: Path) -> None:
     """Say which files were written."""
-    console().print(f"wrote {' and '.join(map(str, paths))}", soft_wrap=True)
-
-
-def print_facts(facts: Iterable[Fact]) -> None:
-    """A line for each fact that is known, wrapped where the terminal ends."""
-    out = console()
-    for one in facts:
-        if said := one.in_full:
-            line = f"  {one.label + ':':<{FACTS - 3}} {said}"
-            wrapped = textwrap.wrap(
-                line, out.width, subsequent_indent=" " * FACTS,
-                break_long_words=False, break_on_hyphens=False,
-            )  # fmt: skip
-            out.print("\n".join(wrapped), soft_wrap=True)
+    say(f"wrote {' and '.join(map(str, paths))}")
 
 
 def print_result(name: str, tables: Sequence[recording.Table], facts: Iterable[Fact]) -> None:
@@ -96,7 +88,14 @@ def print_result(name: str, tables: Sequence[recording.Table], facts: Iterable[F
             title = ""
     if title:
         out.print(title, soft_wrap=True)
-    print_facts(facts)
+    for fact in facts:
+        if said := fact.in_full:
+            line = f"  {fact.label + ':':<{FACTS - 3}} {said}"
+            wrapped = textwrap.wrap(
+                line, out.width, subsequent_indent=" " * FACTS,
+                break_long_words=False, break_on_hyphens=False,
+            )  # fmt: skip
+            out.print("\n".join(wrapped), soft_wrap=True)
     for one in tables:
         if one.title:
             out.print()

@@ -15,8 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop
 from maneuver_automaton.formats.documents import checked, errors_at, kind_of, parsed
-from maneuver_automaton.formats.fleet_json import load_fleet
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.formats.fleet_json import load_fleet, load_fleet_loop
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,

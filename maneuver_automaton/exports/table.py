@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
-from maneuver_automaton.exports.earth import degrees_of
+from maneuver_automaton.exports.geojson import degrees_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
 
@@ -127,18 +127,15 @@ def _curvature(rows: PlanArrays, rates: Array, model: Model | None) -> Array:
         else:
             bend = turn / ahead
     stands = speed < AT_REST
-    bend = np.where(stands, 0.0 if model is None else _bend_at_rest(model, rows), bend)
-    return np.where(stands & (np.abs(turn) >= AT_REST), np.nan, bend)
-
-
-def _bend_at_rest(model: Model, rows: PlanArrays) -> Array:
-    """Curvature (n,) at which a vehicle would set off: of turn rate to speed, as both rise."""
-    bend, n_z = np.zeros(len(rows.time)), rows.reduced_state.shape[1]
+    # At rest that at which it would set off: of turn rate to speed, as both rise.
+    bend, n_z = np.where(stands, 0.0, bend), rows.reduced_state.shape[1]
     for along in np.eye(n_z + rows.control.shape[1]):
+        if model is None:
+            break
         change = _derivative(model, rows.reduced_state, rows.control, along[:n_z], along[n_z:])
-        moves = change[:, 0] != 0.0
+        moves = stands & (change[:, 0] != 0.0)
         bend[moves] = change[moves, 2] / change[moves, 0]
-    return bend
+    return np.where(stands & (np.abs(turn) >= AT_REST), np.nan, bend)
 
 
 def twist_rates(model: Model, state: Array, control: Array) -> Array:

@@ -242,8 +242,16 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
     _check_rows(document["steps"], automaton, path)
     with errors_at(path):
-        steps = tuple(_step_of(row, automaton) for row in document["steps"][:-1])
-    return steps, np.array([row["vehicle_pose"] for row in document["steps"]], dtype=np.float64)
+        steps = []
+        for row in document["steps"][:-1]:
+            plan = plan_of(row["pose"], float(row["time_s"]), row["plan"], automaton)
+            decision = Decision(row.get("decision") or row["deed"])
+            value = float(row["value"])  # of what is driven it is known
+            one = made(Step, row, AppliedEntry, plan=plan, decision=decision, value=value)
+            steps.append(one)
+    return tuple(steps), np.array(
+        [row["vehicle_pose"] for row in document["steps"]], dtype=np.float64
+    )
 
 
 def _check_rows(rows: list[dict[str, Any]], automaton: Automaton, path: Path | str) -> None:
@@ -265,13 +273,6 @@ def _check_rows(rows: list[dict[str, Any]], automaton: Automaton, path: Path | s
             raise misstated(path, ("steps", k, "control"), "got nothing, need a list")
         if control is not None and len(control) != len(names):
             raise misstated(path, ("steps", k, "control"), f"need {', '.join(names)}")
-
-
-def _step_of(row: Mapping[str, Any], automaton: Automaton) -> Step:
-    plan = plan_of(row["pose"], float(row["time_s"]), row["plan"], automaton)
-    decision = Decision(row.get("decision") or row["deed"])
-    value = float(row["value"])  # of what is driven it is known
-    return made(Step, row, AppliedEntry, plan=plan, decision=decision, value=value)
 
 
 def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:

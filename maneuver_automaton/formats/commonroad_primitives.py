@@ -185,7 +185,11 @@ def automaton_of_commonroad_primitives(
 ) -> Automaton:
     """The automaton of a file; primitives cut at a limit end in trims of their own."""
     model = vehicle_of(file) if vehicle is None else vehicle
-    ends = _ends(file)
+    # Speed and steering (2, 2) of the trims where each primitive begins and ends.
+    ends = np.array([one.states[[0, -1], 3:] for one in file.primitives])
+    for k in range(2):
+        levels = levels_of(ends[:, 0, k], ends[:, 1, k], apart=FITS)
+        ends[..., k] = nearest_level(ends[..., k].ravel(), levels).reshape(-1, 2)
     pairs = np.unique(np.concatenate(ends), axis=0)
     trims = tuple(
         Trim(
@@ -312,18 +316,7 @@ def _lengths_and_turns(file: RoadPrimitives) -> tuple[Array, Array]:
     return np.concatenate(crossed), np.concatenate(turned)
 
 
-def _ends(file: RoadPrimitives) -> list[Array]:
-    """Speed and steering (2, 2) of the trims where each primitive begins and ends."""
-    stated = np.array([one.states[[0, -1], 3:] for one in file.primitives])
-    for k in range(2):
-        levels = levels_of(stated[:, 0, k], stated[:, 1, k], apart=FITS)
-        stated[..., k] = nearest_level(stated[..., k].ravel(), levels).reshape(-1, 2)
-    return list(stated)
-
-
-def _courses_between(
-    model: SecondOrderCar, file: RoadPrimitives, ends: list[Array]
-) -> list[Trajectory]:
+def _courses_between(model: SecondOrderCar, file: RoadPrimitives, ends: Array) -> list[Trajectory]:
     """The motions under controls that lead from state to state, from trim to trim."""
     most = max(len(one.states) for one in file.primitives) - 1
     control = np.zeros((len(ends), most, 2))
@@ -333,9 +326,8 @@ def _courses_between(
         states[0], states[-1] = ends[k]
         control[k, : len(states) - 1] = np.diff(states, axis=0) / step
         durations[k, : len(states) - 1] = step
-    begins = np.array([pair[0] for pair in ends])
-    courses = drive_all(model, begins, control=control, durations=durations)
-    return [ending_at(course, pair[1]) for course, pair in zip(courses, ends, strict=True)]
+    courses = drive_all(model, ends[:, 0], control=control, durations=durations)
+    return [ending_at(course, last) for course, last in zip(courses, ends[:, 1], strict=True)]
 
 
 def _stated(car: SecondOrderCar, maneuver: Maneuver) -> RoadPrimitive:

@@ -34,7 +34,7 @@ KINDS = {  # of documents: where it is stated, its file, and keys without which 
     "loop": ("closed_loop_json.LoopDocument", ("reached", "steps", "step_s")),
     "statistics": ("closed_loop_json.StatisticsDocument", ("loops",)),
     "fleet": ("fleet_json.FleetDocument", ("status", "vehicles")),
-    "fleet-loop": ("fleet_loop_json.FleetLoopDocument", ("status", "vehicles", "steps")),
+    "fleet-loop": ("fleet_json.FleetLoopDocument", ("status", "vehicles", "steps")),
     "road-plan": ("road_json.RoadPlanDocument", ("status", "primitives", "trajectory")),
     "drive": ("road_json.DriveDocument", ("reached", "steps", "step_s")),
     "road-fleet": ("road_json.RoadFleetDocument", ("status", "vehicles")),

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, wrapped
+from maneuver_automaton._arrays import Array, as_array, freeze, wrapped
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.groups import SE2
@@ -229,7 +229,9 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
             f"turning_radius: {turning_radius:g} m are {radius:.6g} cells of {resolution:g} m, "
             f"need at most {MOST_CELLS}"
         )
-    directions = _directions()
+    turned = np.array([[0, 1], [-1, 0]])  # cells (16, 2), counter-clockwise from the x axis
+    quarters = [np.array(QUARTER) @ np.linalg.matrix_power(turned, k) for k in range(4)]
+    directions = np.concatenate(quarters)
     headings = np.mod(np.arctan2(directions[:, 1], directions[:, 0]), 2.0 * math.pi)
     n = len(headings)
     steps = [k for k in range(-MOST_TURNED, MOST_TURNED + 1) if k]
@@ -242,7 +244,9 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
     moves = []
     for a in range(n):
         count = math.ceil(radius * gap / float(np.hypot(*directions[a])) - ALIKE)
-        ends = {a: _straight(headings[a], count * directions[a])}
+        to = count * directions[a]
+        places = np.linspace(0.0, 1.0, math.ceil(float(np.hypot(*to)) - ALIKE) + 1)[:, None] * to
+        ends = {a: np.column_stack([places, np.full(len(places), headings[a])])}
         for k in steps:
             b = (a + k) % n
             if not _is_chain(turns, a, k, n):
@@ -256,13 +260,6 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
     return Lattice(
         resolution=resolution, headings=headings, moves=tuple(moves), turning_radius=turning_radius
     )
-
-
-def _directions() -> IntArray:
-    """Cells (16, 2) at which the headings point, counter-clockwise from the x axis."""
-    quarter = np.array(QUARTER)
-    turned = np.array([[0, 1], [-1, 0]])
-    return np.concatenate([quarter @ np.linalg.matrix_power(turned, k) for k in range(4)])
 
 
 def _shortest(first: float, last: float, radius: float) -> _LatticeTurn:
@@ -300,12 +297,6 @@ def _is_chain(turns: dict[tuple[int, int], _LatticeTurn], a: int, k: int, n: int
         if np.array_equal(cells, whole.cells) and not longer:
             return True
     return False
-
-
-def _straight(heading: float, to: Array) -> Array:
-    count = math.ceil(float(np.hypot(*to)) - ALIKE)
-    places = np.linspace(0.0, 1.0, count + 1)[:, None] * to
-    return np.column_stack([places, np.full(count + 1, heading)])
 
 
 def _along(first: float, last: float, turn: _LatticeTurn) -> Array:

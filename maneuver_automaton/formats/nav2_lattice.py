@@ -166,8 +166,10 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2File:
             f"{label}: has neither a turning radius nor arcs; a file of {KIND} states one"
         )
     least = min(radii) if lattice.turning_radius is None else lattice.turning_radius
+    spins = any(not move.poses[:, :2].any() for move in moves)
+    aside = any(abs(_along(move)[1]) > SIDEWAYS for move in moves)
     head: Nav2Head = {
-        "motion_model": _motion(moves),
+        "motion_model": "omni" if aside else "diff" if spins else "ackermann",
         "turning_radius": least,
         "grid_resolution": lattice.resolution,
         "num_of_headings": lattice.headings.size,
@@ -284,9 +286,3 @@ def _along(move: Move) -> tuple[float, float]:
         return 0.0, 0.0
     angle = math.atan2(far[0, 1], far[0, 0]) - move.poses[0, 2]
     return math.cos(angle), math.sin(angle)
-
-
-def _motion(moves: Sequence[Move]) -> str:
-    if any(abs(_along(move)[1]) > SIDEWAYS for move in moves):
-        return "omni"
-    return "diff" if any(not move.poses[:, :2].any() for move in moves) else "ackermann"

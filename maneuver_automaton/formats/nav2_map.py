@@ -69,7 +69,10 @@ def map_of_document(
 ) -> OccupancyMap:
     """The map of a YAML file that was read before; see `load_nav2_map`."""
     header = _header(document)
-    cells = _blocked(_image(document, path, header), header, unknown=unknown)
+    occupancy, known = _occupancy(_image(document, path, header), header)
+    cells = (occupancy >= header.occupied) & known  # the first row at the top
+    if unknown == "blocked":
+        cells |= (occupancy > header.free) | ~known
     return OccupancyMap(
         cells[::-1], resolution=header.resolution, origin=header.origin, name=path.name
     )
@@ -218,16 +221,6 @@ def _occupancy(image: GreyImage, header: _Header) -> tuple[Array, NDArray[np.boo
         shares = np.round(image.shade * 255.0) / 100.0
         return shares, shares <= 1.0
     return image.shade if header.negate else 1.0 - image.shade, image.opaque
-
-
-def _blocked(image: GreyImage, header: _Header, *, unknown: Unknown) -> NDArray[np.bool_]:
-    """Blocked cells, the first row at the top."""
-    occupancy, known = _occupancy(image, header)
-    blocked = occupancy >= header.occupied
-    if unknown == "blocked":
-        blocked |= occupancy > header.free
-        return blocked | ~known
-    return blocked & known
 
 
 OTHER_IMAGES = (".png", ".bmp")

@@ -42,7 +42,6 @@ from maneuver_automaton.roads import (
     RoadStep,
     RoadVerdict,
 )
-from maneuver_automaton.roads.vehicle import RoadLibrary
 
 GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable": "drivable"}
 
@@ -247,10 +246,13 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
 
 def _library(planner: RoadPlanner) -> dict[str, Any]:
     """The keys that name a road, a vehicle and its library."""
+    digest, library = hashlib.sha256(), planner.library
+    for part in (*library.trims[:2], library.maneuvers.target, library.maneuvers.control):
+        digest.update(np.ascontiguousarray(part).tobytes())
     return {
         "name": planner.scene.name,
         "vehicle": vehicle_entry(planner.vehicle.model),
-        "automaton_hash": library_hash(planner.library),
+        "automaton_hash": digest.hexdigest(),
     }
 
 
@@ -261,14 +263,6 @@ def _primitives(plan: Plan | None) -> list[PrimitiveEntry]:
         if isinstance(one, Maneuver) and one.course is not None:
             row["control"] = one.course.control[0].tolist()
     return entries
-
-
-def library_hash(library: RoadLibrary) -> str:
-    """Hash of the trims and maneuvers."""
-    digest = hashlib.sha256()
-    for part in (*library.trims[:2], library.maneuvers.target, library.maneuvers.control):
-        digest.update(np.ascontiguousarray(part).tobytes())
-    return digest.hexdigest()
 
 
 def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> DriveStepEntry:

@@ -122,10 +122,15 @@ def pieces_during(
         shares *= np.stack([begin == clock[:-1], end == clock[1:]], axis=1)
         rates = np.concatenate([_rates(one, begin), _rates(one, end)], axis=1)
         rates *= np.repeat(shares, len(one.corners), axis=1)[..., None]
-        bulges = one.rounding + settled(_bulges(one, begin, end))
+        # How far paths of corners lead beside the chords [m], by some looks.
+        beside, here, there = np.zeros(len(begin)), _corners(one, begin), _corners(one, end)
+        for share in INSIDE:
+            gap = _corners(one, begin + share * (end - begin)) - (here + share * (there - here))
+            beside = np.maximum(beside, np.hypot(gap[..., 0], gap[..., 1]).max(axis=1))
+        bulges = one.rounding + settled(beside)
         solids += list(zip(both, bulges.tolist(), strict=True))
-        there = (clock[:-1] <= last) & (clock[1:] >= first)
-        intervals.append(np.where(there, np.arange(len(durations)), NEVER))
+        present = (clock[:-1] <= last) & (clock[1:] >= first)
+        intervals.append(np.where(present, np.arange(len(durations)), NEVER))
         shifts.append(np.pad(settled(rates), ((0, 0), (0, most - rates.shape[1]), (0, 0))))
     return ObstaclePieces(
         solids,
@@ -147,16 +152,6 @@ def _rates(one: MovingSolid, times: Array) -> Array:
     """Velocities (n, m, 2) of the corners [m/s]."""
     ahead, behind = _corners(one, times + NEARBY), _corners(one, times - NEARBY)
     return np.asarray((ahead - behind) / (2.0 * NEARBY))
-
-
-def _bulges(one: MovingSolid, begin: Array, end: Array) -> Array:
-    """How far paths of corners lead beside the chords (n,) [m], by some looks."""
-    here, there = _corners(one, begin), _corners(one, end)
-    most = np.zeros(len(begin))
-    for share in INSIDE:
-        gap = _corners(one, begin + share * (end - begin)) - (here + share * (there - here))
-        most = np.maximum(most, np.hypot(gap[..., 0], gap[..., 1]).max(axis=1))
-    return most
 
 
 LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]

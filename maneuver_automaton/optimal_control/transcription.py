@@ -177,7 +177,11 @@ def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
                 f"({', '.join(problem.state_names)})"
             )
         running = [] if problem.stage_cost is None else [problem.stage_cost(xs, us)]
-        return casadi.vertcat(*(_row(casadi, rate, x.shape[1]) for rate in [*rates, *running]))
+        rows = [casadi.SX(rate) for rate in [*rates, *running]]  # a number is one for all nodes
+        count = x.shape[1]
+        return casadi.vertcat(
+            *(row if row.shape == (1, count) else casadi.repmat(row, 1, count) for row in rows)
+        )
 
     with numpy_on_symbols(casadi):
         step, inputs = duration / (n - 1), control
@@ -293,12 +297,6 @@ def solve(
         worst_defect=checked.worst_defect,
         worst_violation=checked.worst_violation,
     )
-
-
-def _row(casadi: Any, value: Any, count: int) -> Any:
-    """A row of symbols (1, count), from one or from a number."""
-    row = casadi.SX(value)
-    return row if row.shape == (1, count) else casadi.repmat(row, 1, count)
 
 
 def unpacked(

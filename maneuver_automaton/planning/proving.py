@@ -40,7 +40,7 @@ def kept_bounds(problem: Problem, workspace: Workspace) -> deque[CostToGo] | Non
     """
     if workspace.prepared is RECENT:
         return None
-    from maneuver_automaton.bounds.pose_scene import lasting_obstacles
+    from maneuver_automaton.bounds.cells import lasting_obstacles
 
     aims = tuple(
         (tuple(goal.pose[:3].tolist()), goal.tolerance_m, goal.tolerance_rad, goal.free_heading)

@@ -13,15 +13,15 @@ from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
+    from maneuver_automaton.plotting.automata import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.automata import draw_motions as draw_motions
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
+    from maneuver_automaton.plotting.automata import save_maneuvers_figure as save_maneuvers_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
     from maneuver_automaton.plotting.look import Look as Look
-    from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
-    from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
     from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
     from maneuver_automaton.plotting.pictures import draw_plane as draw_plane
     from maneuver_automaton.plotting.pictures import figure_of as figure_of

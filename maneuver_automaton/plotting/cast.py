@@ -99,6 +99,7 @@ def _map_box(cells: OccupancyMap) -> Array:
     return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
+TINY = 0.008  # of the picture: smaller bodies are marks at starts and goals
 MOST_NAMES = 12  # of vehicles in a legend; more have numbers at their starts
 MOST_LABEL = 4  # characters of a name that stands at a start itself
 STEPS, STEPS_OF_MANY = 10, 5  # between the times at which bodies are shown
@@ -196,15 +197,11 @@ class Actor:
 
     def bodies_along(self, times: Array) -> list[Array]:
         """Outlines (n, 2) of all its parts at times (n,) [s], first one shape, then the next."""
-        return (
-            [
-                ring
-                for part in self.parts
-                for ring in placed(footprint_polygons(part.bodies[""]), part.pose_at(times))
-            ]
-            if self.body
-            else []
-        )
+        return [
+            ring
+            for part in (self.parts if self.body else ())
+            for ring in placed(footprint_polygons(part.bodies[""]), part.pose_at(times))
+        ]
 
     def points(self, size: float) -> Array:
         """Places (n, 2) where something happens: tracks, bodies along them, start and goals."""
@@ -253,6 +250,12 @@ class Cast:
         """Whether an obstacle moves."""
         obstacles = self.recording.world.obstacles
         return any(isinstance(one, Obstacle) and one.motion is not None for one in obstacles)
+
+    @property
+    def small(self) -> list[Actor]:
+        """Vehicles so small in the picture that marks show where they start and end."""
+        least = TINY * float(np.ptp(self.box, axis=0).max())
+        return [one for one in self.actors if one.reach < least]
 
     @property
     def is_many(self) -> bool:

@@ -17,7 +17,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.colors import GREY, INK, Color, track_colors
 from maneuver_automaton.plotting.style import outer_legend, tidy
-from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
+from maneuver_automaton.plotting.track import Track, track_of_plan
 
 STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     "-",
@@ -106,8 +106,14 @@ def draw_controls(
 
 
 def step_curves(track: Track, k: int) -> list[Array]:
-    """Control `k` over time, corners (n, 2) of its steps for each piece."""
-    return [_steps(piece, k) for piece in track.pieces]
+    """Control `k` over time, held from sample to sample: corners (n, 2) of its steps by piece."""
+    curves = []
+    for piece in track.pieces:
+        changes = np.flatnonzero(np.diff(piece.control[:-1, k])) + 1
+        starts = np.concatenate([[0], changes])
+        times = np.stack([piece.time[starts], piece.time[np.append(changes, -1)]], axis=-1)
+        curves.append(np.stack([times.ravel(), np.repeat(piece.control[starts, k], 2)], axis=-1))
+    return curves
 
 
 def draw_over_time(
@@ -116,14 +122,11 @@ def draw_over_time(
     curves: Sequence[Array],
     *,
     label: str,
-    colors: Mapping[str, Color] | Color,
+    colors: Mapping[str, Color],
     style: int = 0,
 ) -> StepArtists:
-    """Draw one curve (n, 2) per piece of a `track` in the colour of its trim, or all in one."""
-    one_color = None if isinstance(colors, Mapping) else colors
-    shown = [
-        colors[piece.name] if isinstance(colors, Mapping) else colors for piece in track.pieces
-    ]
+    """Draw one curve (n, 2) per piece of a `track` in the colour of its trim."""
+    shown = [colors[piece.name] for piece in track.pieces]
     times = track.switching_times
     crowded = len(track.pieces) > CROWDED
     artists = StepArtists(
@@ -133,7 +136,7 @@ def draw_over_time(
         ),
         jumps=LineCollection(
             [np.stack([a[-1], b[0]]) for a, b in pairwise(curves)],
-            colors=[one_color or GREY], linewidths=0.35 if crowded else 0.9, zorder=2.5,
+            colors=[GREY], linewidths=0.35 if crowded else 0.9, zorder=2.5,
         ),
         switches=LineCollection(
             [] if crowded else [[(t, 0.0), (t, 1.0)] for t in times],
@@ -155,14 +158,6 @@ def within(ax: Axes, label: str) -> str:
     high = ax.bbox.height / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
     most = max(12, int((high + OVER) / CHARACTER))
     return label if len(label) <= most else "\n".join(textwrap.wrap(label, most))
-
-
-def _steps(piece: TrackPiece, k: int) -> Array:
-    """Corners (n, 2) of control `k` of a piece over time, held from sample to sample."""
-    changes = np.flatnonzero(np.diff(piece.control[:-1, k])) + 1
-    starts = np.concatenate([[0], changes])
-    times = np.stack([piece.time[starts], piece.time[np.append(changes, -1)]], axis=-1)
-    return np.stack([times.ravel(), np.repeat(piece.control[starts, k], 2)], axis=-1)
 
 
 def _set_limits(ax: Axes, times: Array, curves: Sequence[Array]) -> None:

@@ -33,9 +33,10 @@ from maneuver_automaton.plotting.paths import (
     draw_ends,
 )
 from maneuver_automaton.plotting.pictures import draw_world, plane_entries, see
-from maneuver_automaton.plotting.together import DASHES, HATCH, TINY
+from maneuver_automaton.plotting.together import DASHES, HATCH
 from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.recording import Event, recording_of
+from maneuver_automaton.recording.values import few
 
 FRAMES_PER_SECOND = 15
 MOST_FRAMES = 150  # longer motions are shown faster
@@ -208,8 +209,7 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
     bodies = PolyCollection([], linewidths=1.0 if outlined else 0.0, zorder=4.0)
     for part in (old, jumps, ahead, trails, bodies):
         ax.add_collection(part, autolim=False)
-    extent = float(np.ptp(cast.box, axis=0).max())
-    small = [one for one in cast.actors if one.mover.has_plan and one.reach < TINY * extent]
+    small = [one for one in cast.small if one.mover.has_plan]
     dots = ax.scatter([], [], s=18.0, linewidths=0.0, zorder=4.1)
     traffic = still["traffic"]
     shapes = moving_shapes(cast.recording.world.obstacles, fleeting=cast.recording.world.fleeting)
@@ -328,8 +328,7 @@ def _texts_of(events: Sequence[Event], kind: str) -> list[str]:
         return []
     if kind != "exchanged":
         return ["replanned" if kind == "replanned" else "guarantee broken"]
-    more = f" and {len(some) - MOST_SAID} more" if len(some) > MOST_SAID else ""
-    return [f"exchanged: {', '.join(event.text for event in some[:MOST_SAID])}{more}"]
+    return [f"exchanged: {few([event.text for event in some], MOST_SAID)}"]
 
 
 def _draw_still(ax: Any, cast: Cast) -> None:

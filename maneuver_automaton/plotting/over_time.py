@@ -211,19 +211,17 @@ def _compared(cast: Cast) -> list[Panel]:
         tidy(ax, x=TIME_LABEL, y=within(ax, [*states, *controls][k]))
 
     more = {one.label: one.unit for one in cast.recording.curves if one.label not in OWN_PANEL}
+
+    def draw_curves(ax: Axes, label: str) -> None:
+        colors = {one.mover.name: one.color for one in cast.actors}
+        for one in (one for one in cast.recording.curves if one.label == label):
+            ax.plot(one.time, one.value, color=colors[one.mover], linewidth=1.4)
+        tidy(ax, x=TIME_LABEL, y=within(ax, f"{label} [{more[label]}]"))
+
     return [
         *(Panel(partial(draw, k=k)) for k in range(min(count, max(MOST_STATES - len(more), 1)))),
-        *(Panel(partial(_draw_curves, cast=cast, label=label)) for label in more),
+        *(Panel(partial(draw_curves, label=label)) for label in more),
     ]
-
-
-def _draw_curves(ax: Axes, *, cast: Cast, label: str) -> None:
-    colors = {one.mover.name: one.color for one in cast.actors}
-    for one in cast.recording.curves:
-        if one.label == label:
-            ax.plot(one.time, one.value, color=colors[one.mover], linewidth=1.4)
-            said = f"{label} [{one.unit}]"
-    tidy(ax, x=TIME_LABEL, y=within(ax, said))
 
 
 def labels_of(mover: Mover, piece: TrackPiece) -> tuple[list[str], list[str]]:

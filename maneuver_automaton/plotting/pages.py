@@ -42,19 +42,6 @@ TICKS, LABEL, EDGE = 0.2, 0.4, 0.12  # [in] of numbers, of numbers and a label, 
 FIRST = 4.0  # [in] height of a page before it is known
 
 
-def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
-    """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one."""
-    said = [look.title, *([] if look.is_paper else others)]
-    shown = [(text, k) for k, text in enumerate(said) if text]
-    lines = []
-    for place, (text, k) in enumerate(shown):
-        size = TITLE_PT if k == 0 else HEAD_PT if place == 0 else style.TEXT_PT
-        most = max(20, int(width / ((0.0077 if place else 0.0092) * size)))
-        filled = "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
-        lines.append((filled, size, "normal" if place else "bold"))
-    return lines
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Page:
     """A figure with its axes: the plane, and what is over time, beside or below it."""
@@ -161,16 +148,20 @@ def plain_page(
 
 
 def _headed(figure: Figure, look: Look, lines: Sequence[str], width: float) -> float:
-    """Give a figure a heading from the upper left corner down; the height [in] of that."""
+    """Give a figure a title, then `lines`, the first bold without one; their height [in]."""
     figure.set(figwidth=width, figheight=FIRST, dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)  # it belongs to no window
-    top = EDGE
-    for text, size, weight in _title_lines(look, width - 2.0 * EDGE, *lines):
+    top, said = EDGE, [look.title, *([] if look.is_paper else lines)]
+    shown = [(text, k) for k, text in enumerate(said) if text]
+    for place, (text, k) in enumerate(shown):
+        size = TITLE_PT if k == 0 else HEAD_PT if place == 0 else style.TEXT_PT
+        most = max(20, int((width - 2.0 * EDGE) / ((0.0077 if place else 0.0092) * size)))
+        filled = "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
         figure.text(
-            EDGE / width, 1.0 - top / FIRST, text, fontsize=size, fontweight=weight, color=INK,
-            va="top", ha="left", parse_math=False, linespacing=1.25,
+            EDGE / width, 1.0 - top / FIRST, filled, fontsize=size, color=INK, va="top", ha="left",
+            fontweight="normal" if place else "bold", parse_math=False, linespacing=1.25,
         )  # fmt: skip
-        top += 1.42 * size / 72.0 * (1 + text.count("\n"))
+        top += 1.42 * size / 72.0 * (1 + filled.count("\n"))
     return top + 0.5 * EDGE
 
 

@@ -33,6 +33,7 @@ from maneuver_automaton.plotting.paths import draw_path, end_entries, path_entri
 from maneuver_automaton.plotting.style import SMALL_PT, Entries, outer_legend, word_text
 from maneuver_automaton.plotting.together import draw_vehicles, vehicle_entries
 from maneuver_automaton.recording import Recording, Search, recording_of
+from maneuver_automaton.recording.values import few
 
 REACHED = (0.82, 0.89, 0.95)  # not through: squares of several sizes lie upon each other
 COLORMAP = "viridis_r"  # pale for cheap, dark for costly; made for colour-blind readers too
@@ -181,7 +182,7 @@ def _draw_search(ax: Axes, search: Search) -> dict[str, Any]:
 
 VIEWS = ("plane", "space", "alternatives")
 WORD_LINES, CHARACTER = 2, 0.08  # lines of the word, and [in] of each character
-MOST_REASONS, MOST_NAMES = 4, 4  # above a picture, and names of vehicles for each
+MOST_REASONS = 4  # above a picture
 MOST_BROKEN, TEXT_WIDTH = 2, 132
 
 
@@ -311,10 +312,6 @@ def _reasons(recording: Recording) -> list[str]:
     for one in recording.movers:
         if one.name and not (one.has_plan and one.reached):
             named.setdefault(one.reason or "no plan", []).append(one.name)
-    lines = []
-    for reason, names in named.items():
-        more = len(names) - MOST_NAMES
-        rest = f" and {more} more" if more > 0 else ""
-        lines.append(f"{', '.join(names[:MOST_NAMES])}{rest}: {reason}")
+    lines = [f"{few(names)}: {reason}" for reason, names in named.items()]
     more = len(lines) - MOST_REASONS
     return lines if more <= 0 else [*lines[:MOST_REASONS], f"and {more} more reasons"]

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -73,7 +72,9 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
     faces: list[Array] = []
     inner: list[Color] = []
     rims: list[tuple[float, ...]] = []
-    size = float((high - low).max())
+    size, level = float((high - low).max()), math.cos(math.radians(ELEVATION))
+    turned = math.radians(AZIMUTH)
+    seen = [level * math.cos(turned), level * math.sin(turned), math.sin(math.radians(ELEVATION))]
     for obstacle in _standing(cast):
         bottom, top = _height(obstacle) or (low[2], high[2])
         for face, shade in _prism(obstacle, max(bottom, low[2]), min(top, high[2])):
@@ -82,9 +83,6 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
             rims.append((*shaded(BUILDING, -0.25), 0.5))
     for places, color, width in _strokes(cast, ground=float(low[2])):
         # A stroke (2, 3) as a face (4, 3) that is seen from the front.
-        azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
-        level = math.cos(elevation)
-        seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
         aside = np.cross(places[1] - places[0], seen)
         length = float(np.linalg.norm(aside))
         aside = 0.5 * (width * size) * aside / length if length > 0.0 else np.zeros(3)
@@ -106,13 +104,16 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
         ax.add_collection3d(collection)
     path = [(places, color) for places, color, _ in _strokes(cast, ground=None)]
     if path:
-        through = Line3DCollection(
+        ax.add_collection3d(Line3DCollection(
             [places for places, _ in path], colors=[color for _, color in path],
             linewidths=1.6, alpha=HIDDEN, zorder=5, clip_on=False,
-        )  # fmt: skip
-        ax.add_collection3d(through)
+        ))  # fmt: skip
     for pose, color, marker in _ends(cast):
-        _mark(ax, pose, color, marker)
+        ax.plot(
+            pose[[0]], pose[[1]], pose[[3]], marker=marker, color=color, linestyle="none",
+            markersize=7 if marker == "o" else 12, markeredgecolor="white", markeredgewidth=0.6,
+            zorder=10, clip_on=False,
+        )  # fmt: skip
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(tuple(high - low), zoom=1.32)
     ax.view_init(elev=ELEVATION, azim=AZIMUTH)
@@ -273,13 +274,3 @@ def _box(cast: Cast) -> tuple[Array, Array]:
             high[2] = max(high[2], heights[1]) if math.isfinite(heights[1]) else high[2]
     pad = 0.02 * float((high - low).max()) + 1e-3
     return low - [pad, pad, 0.0], high + pad
-
-
-def _mark(ax: Axes3D, pose: Array, color: Color, marker: str) -> Line2D:
-    mark: Line2D
-    (mark,) = ax.plot(
-        pose[[0]], pose[[1]], pose[[3]], marker=marker, color=color, linestyle="none",
-        markersize=7 if marker == "o" else 12, markeredgecolor="white", markeredgewidth=0.6,
-        zorder=10, clip_on=False,
-    )  # fmt: skip
-    return mark

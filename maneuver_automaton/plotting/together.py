@@ -20,7 +20,6 @@ from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.paths import HELD_STYLE, JUMP, JUMP_STYLE
 from maneuver_automaton.plotting.style import Entries, dashed_handle, line_handle, mark_handle
 
-TINY = 0.008  # of the picture: smaller bodies are marks at starts and goals
 HATCH = "/////"
 DASHES = (0, (3, 2))
 FRONT = 0.8  # of the reach of a body, a line from its pose on shows where it looks
@@ -35,9 +34,7 @@ SLACK_S = 1e-6
 def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, Any]:
     """Draw all vehicles of a cast, with bodies on their paths; the artists by what they show."""
     actors = cast.actors
-    extent = float(np.ptp(cast.box, axis=0).max())
-    driving = [one for one in actors if one.mover.has_plan]
-    small = [one for one in actors if one.reach < TINY * extent]
+    driving, small = [one for one in actors if one.mover.has_plan], cast.small
     seen = [one for one in driving if one not in small]
     missed = [
         one for one in actors if one not in small and not (one.mover.has_plan and one.mover.reached)
@@ -47,7 +44,6 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
     width, alpha = next((weights for most, weights in DIM.items() if len(actors) <= most), THIN)
     along = [(one, time) for one in driving for time in _between(one, cast.times)]
     held = [(track, one) for one in actors for _, track in one.held]
-    jumps = [line for one in actors for _, line in one.jumps]
     wanted = [(ring, one) for one in missed for ring in one.goal_outlines]
     fronts, inks = [], []  # from poses to the fronts of bodies, at the start and at the end
     for one in seen:
@@ -60,7 +56,7 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
             [one.track.pose[:, :2] for one in driving], colors=[one.color for one in driving],
             linewidths=width, capstyle="round", joinstyle="round", zorder=3.0,
         ),
-        "bodies": _bodies([(one, time) for one, time in along], face=0.4 * alpha, edge=2.2 * alpha),
+        "bodies": _bodies(along, face=0.4 * alpha, edge=2.2 * alpha),
         "starts": _bodies(
             [(one, one.mover.start_time) for one in seen], face=0.0, edge=1.0, width=1.5
         ),
@@ -76,23 +72,21 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
             colors=[shaded(one.color, HELD) for _, one in held], zorder=1.9,
         ),
         "jumps": LineCollection(
-            jumps, colors=[JUMP], linewidths=1.3, linestyles=[JUMP_STYLE], zorder=3.3
+            [line for one in actors for _, line in one.jumps], colors=[JUMP], linewidths=1.3,
+            linestyles=[JUMP_STYLE], zorder=3.3,
         ),
     }  # fmt: skip
     artists["starts"].set_path_effects(CASING)
     for part in artists.values():
         ax.add_collection(part, autolim=False)
-    at = [one.track.start for one in dots], [one.track.end for one in dots]
     goals = [(goal.pose, one) for one in lost for goal in one.mover.goals]
     artists |= {
-        "start marks": _marks(ax, at[0], dots, size=26.0, filled=False),
-        "goal marks": _marks(ax, at[1], dots, size=20.0, filled=True),
+        "start marks": _marks(ax, [(one.track.start, one) for one in dots], size=26.0),
+        "goal marks": _marks(ax, [(one.track.end, one) for one in dots], size=20.0, filled=True),
         "missing marks": _marks(
-            ax, [one.track.start for one in lost], lost, size=34.0, filled=True, marker="X"
+            ax, [(one.track.start, one) for one in lost], size=34.0, filled=True, marker="X"
         ),
-        "wanted marks": _marks(
-            ax, [pose for pose, _ in goals], [one for _, one in goals], size=24.0, filled=False
-        ),
+        "wanted marks": _marks(ax, goals, size=24.0),
     }
     for one in actors if cast.is_many else ():
         _number(ax, one)
@@ -131,9 +125,8 @@ def vehicle_entries(cast: Cast, *, moving: bool = False) -> Entries:
 
 def _between(one: Actor, times: Array) -> list[float]:
     """Those of the times at which it is under way [s]."""
-    under_way = (times > one.mover.start_time + SLACK_S) & (times < one.mover.arrival - SLACK_S)
-    found: list[float] = times[under_way].tolist()
-    return found
+    first, last = one.mover.start_time + SLACK_S, one.mover.arrival - SLACK_S
+    return [time for time in times.tolist() if first < time < last]
 
 
 def _bodies(
@@ -143,16 +136,11 @@ def _bodies(
     """Outlines of vehicles at times, filled with a share `face` of their colours."""
     rows = [(ring, one.color) for one, time in at for ring in one.bodies_along(np.array([time]))]
     colors: list[Color] = [color for _, color in rows]
+    look: dict[str, Any] = {"edgecolors": colors, "zorder": 3.6}
     if hatch:
-        look: dict[str, Any] = {
-            "facecolors": "white",
-            "edgecolors": colors,
-            "hatch": hatch,
-            "zorder": 3.6,
-        }
+        look |= {"facecolors": "white", "hatch": hatch}
     elif face == 1.0:
-        look = {"facecolors": colors, "edgecolors": [shaded(c, -0.4) for c in colors]}
-        look["zorder"] = 3.6
+        look |= {"facecolors": colors, "edgecolors": [shaded(c, -0.4) for c in colors]}
     else:
         look = {
             "facecolors": [(*color, face) for color in colors] if face else "none",
@@ -163,11 +151,11 @@ def _bodies(
 
 
 def _marks(
-    ax: Axes, poses: Sequence[Array], actors: Sequence[Actor], *, size: float, filled: bool,
+    ax: Axes, poses: Sequence[tuple[Array, Actor]], *, size: float, filled: bool = False,
     marker: str = "o",
 ) -> PathCollection:  # fmt: skip
-    colors = [one.color for one in actors]
-    at = np.array([pose[:2] for pose in poses]).reshape(-1, 2)
+    colors = [one.color for _, one in poses]
+    at = np.array([pose[:2] for pose, _ in poses]).reshape(-1, 2)
     return ax.scatter(
         at[:, 0], at[:, 1], s=size, marker=marker, linewidths=1.3,
         facecolors=colors if filled else "none", edgecolors=colors, zorder=3.6 if filled else 3.8,

@@ -228,7 +228,10 @@ def _parts(name: str, samples: _Samples) -> list[TrackPiece]:
     pieces = []
     for run in [_Run(0, len(samples.time) - 1, 0)] if whole else runs:
         part = _Samples(*(column[run.first : run.last + 1] for column in samples))
-        twist = _twist(part.time, part.pose)
+        # The mean: what it gains from sample to sample, over its duration.
+        gained = (SE2(part.pose[:-1, :3]).inverse() @ SE2(part.pose[1:, :3])).log().sum(axis=0)
+        climbed = part.pose[-1, 3:] - part.pose[0, 3:]
+        twist = np.concatenate([gained, climbed]) / (part.time[-1] - part.time[0])
         if not whole and run.turn == 0:
             twist[2] = 0.0  # what it still turns can hardly be seen
         pieces.append(
@@ -288,22 +291,9 @@ def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
         k = min(range(len(runs)), key=lambda n: weight(runs[n]))
         beside = [n for n in (k - 1, k + 1) if 0 <= n < len(runs)]
         runs[k] = runs[k]._replace(turn=runs[max(beside, key=lambda n: weight(runs[n]))].turn)
-        runs = _joined(runs)
+        alike = [(turn, list(some)) for turn, some in groupby(runs, lambda run: run.turn)]
+        runs = [_Run(some[0].first, some[-1].last, turn) for turn, some in alike]
     return [runs[0]._replace(turn=0)] if len(runs) == 1 and weight(runs[0]) < 1.0 else runs
-
-
-def _joined(runs: Sequence[_Run]) -> list[_Run]:
-    """Runs in which no two in a row turn alike."""
-    return [
-        _Run(alike[0].first, alike[-1].last, turn)
-        for turn, alike in ((turn, list(some)) for turn, some in groupby(runs, lambda r: r.turn))
-    ]
-
-
-def _twist(time: Array, pose: Array) -> Array:
-    """Mean twist (dof,) of one piece: what it gains from sample to sample, over its duration."""
-    gained = (SE2(pose[:-1, :3]).inverse() @ SE2(pose[1:, :3])).log().sum(axis=0)
-    return np.asarray(np.concatenate([gained, pose[-1, 3:] - pose[0, 3:]]) / (time[-1] - time[0]))
 
 
 DISC_CORNERS = 48

@@ -35,9 +35,7 @@ def maneuver_defect(model: Model, maneuver: Maneuver, *, source: Trim, target: T
     ValueError
         If the maneuver has no course, so that nobody knows how it is driven.
     """
-    course = maneuver.course
-    if course is None:
-        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be driven again")
+    course = maneuver.known_course("so it cannot be driven again")
     state = np.concatenate([np.zeros(model.group.dof), source.reduced_state])
     rates = _rates(model)
     for begin, end, control in pieces(course.time, course.control):

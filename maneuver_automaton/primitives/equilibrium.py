@@ -97,7 +97,12 @@ def trims_of(
     for name, values in axes.items():
         if not values.size:
             raise ValueError(f"grid: got no value of {name}, need at least one")
-    _check_names(model, axes)
+    known = dict.fromkeys((*model.reduced_names, *model.control_names, *_twist_names(model)))
+    if not axes:
+        raise ValueError(f"grid: got no axis, need some of {', '.join(known)}")
+    for name in axes:
+        if name not in known:
+            raise ValueError(f"grid: the {model.name} has no {name!r}, need {', '.join(known)}")
     trims, missing = [], []
     for point in product(*(values.tolist() for values in axes.values())):
         asked = dict(zip(axes, point, strict=True))
@@ -108,15 +113,6 @@ def trims_of(
         else:
             missing.append(found)
     return FoundTrims(trims=tuple(trims), missing=tuple(missing))
-
-
-def _check_names(model: Model, axes: Mapping[str, Array]) -> None:
-    known = dict.fromkeys((*model.reduced_names, *model.control_names, *_twist_names(model)))
-    if not axes:
-        raise ValueError(f"grid: got no axis, need some of {', '.join(known)}")
-    for name in axes:
-        if name not in known:
-            raise ValueError(f"grid: the {model.name} has no {name!r}, need {', '.join(known)}")
 
 
 def _twist_names(model: Model) -> tuple[str, ...]:
@@ -183,7 +179,12 @@ def _trim_at(
     if not solved:  # only what the grid asks for is sure to be beyond its limits
         excess = np.where(np.isnan(balance.given), 0.0, excess)
     if excess.any():
-        return MissingTrim(name=name, reason=_beyond(balance, everything, excess))
+        beyond = [
+            f"{balance.names[k]} would be {everything[k]:.4f}, {excess[k]:.4g} beyond its limit "
+            f"{balance.limits[k, int(everything[k] > balance.limits[k, 1])]:.4f}"
+            for k in np.flatnonzero(excess)
+        ]
+        return MissingTrim(name=name, reason="; ".join(beyond))
     if not solved:
         missed = np.abs(balance.missed(found))
         worst = int(np.argmax(missed))
@@ -287,12 +288,3 @@ def _simplest(missed: Callable[[Array], Array], x: Array) -> Array:
         if np.abs(missed(simple)).max() <= max(np.abs(missed(x)).max(), 1e-15):
             x = simple
     return x
-
-
-def _beyond(balance: _Balance, everything: Array, excess: Array) -> str:
-    parts = [
-        f"{balance.names[k]} would be {everything[k]:.4f}, {excess[k]:.4g} beyond its limit "
-        f"{balance.limits[k, int(everything[k] > balance.limits[k, 1])]:.4f}"
-        for k in np.flatnonzero(excess)
-    ]
-    return "; ".join(parts)

@@ -182,6 +182,12 @@ class Maneuver:
                 f"displacement and duration, got a difference of {off:.3g}"
             )
 
+    def known_course(self, otherwise: str) -> Trajectory:
+        """The course; raises a ValueError that says what comes of it that there is none."""
+        if self.course is None:
+            raise ValueError(f"maneuver {self.name!r}: has no course, {otherwise}")
+        return self.course
+
     @classmethod
     def along(
         cls,

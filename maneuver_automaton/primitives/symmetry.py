@@ -96,9 +96,10 @@ def mirror_of(model: Model) -> Mirror | None:
     few = slice(0, 2)  # most candidates fail on the first
     candidates = _candidates(_changes(model.reduced_limits), _changes(model.control_limits))
     for of_state, of_control in itertools.islice(candidates, MOST_CANDIDATES):
+        exchanged = np.eye(len(of_control.order))[list(of_control.order)]
         mirror = Mirror(
             reduced=of_state.signs,
-            control=_matrix(of_control),
+            control=of_control.signs[:, None] * exchanged + 0.0,
             order=of_state.order if of_state.swaps else None,
         )
         if _holds(model, mirror, state[few], control[few]) and _holds(
@@ -163,10 +164,6 @@ def _candidates(
             yield from itertools.product(by_size[0].get(total - size, ()), by_size[1].get(size, ()))
 
 
-def _matrix(change: _Exchange) -> Array:
-    return np.asarray(change.signs[:, None] * np.eye(len(change.order))[list(change.order)] + 0.0)
-
-
 def _holds(model: Model, mirror: Mirror, state: Array, control: Array) -> bool:
     signs = _pose_signs(model.group.dof)
     there = (mirror.state(state), control @ mirror.control.T)
@@ -209,12 +206,7 @@ def maneuver_in_world(model: OnlyTranslated, maneuver: Maneuver) -> Maneuver:
     """
     if not _is_stated(model, maneuver.displacement):
         return maneuver
-    if maneuver.course is None:
-        raise ValueError(
-            f"maneuver {maneuver.name!r}: has no course, need one to know how far the "
-            f"{model.name} turns"
-        )
-    course = maneuver.course
+    course = maneuver.known_course(f"need one to know how far the {model.name} turns")
     reduced = model.seen(course.reduced_state)
     headings = np.unwrap([model.heading(state) for state in reduced])
     pose = np.array(

@@ -85,7 +85,10 @@ def _chosen(
         for a, b in pairs:
             yield from ((a, b, turn) for turn in _turns(float(headings[a]), float(headings[b])))
         return
-    levels = _distinct(headings)
+    levels: list[float] = []
+    for heading in sorted(headings.tolist()):
+        if all(abs(wrapped(level - heading)) > HEADING_TOLERANCE for level in levels):
+            levels.append(heading)
     if len(levels) < 2:
         return
     between = pairwise([*levels, levels[0]]) if len(levels) > 2 else [tuple(levels)]
@@ -101,14 +104,6 @@ def _chosen(
             # The one whose other controls are those of the source, or else the first.
             kept = [k for k, which in zip(found, changes, strict=True) if set(which) <= {rate}]
             yield from ((a, (kept or found)[0], turn) for turn in _turns(here, there))
-
-
-def _distinct(headings: Array) -> list[float]:
-    levels: list[float] = []
-    for heading in sorted(headings.tolist()):
-        if all(abs(wrapped(level - heading)) > HEADING_TOLERANCE for level in levels):
-            levels.append(heading)
-    return levels
 
 
 def _turns(here: float, there: float) -> tuple[float, ...]:

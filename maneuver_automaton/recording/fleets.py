@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from maneuver_automaton.recording.values import (
     Table,
     asked_for,
     effort_facts,
+    few,
     mover_of,
     nearest_fact,
     shown,
@@ -34,7 +35,6 @@ from maneuver_automaton.recording.values import (
 
 STANDS = "stands"  # the name of what a vehicle does while it has nothing to do
 SHORT = 1e-9  # [s] that is no time
-MOST_NAMES = 4  # of vehicles in a cell
 
 
 def recorded(result: FleetResult | FleetLog) -> Recording | None:
@@ -198,13 +198,8 @@ def _standing_after(piece: Plan, lasting: float) -> Plan:
         reduced_state=last.reduced_state,
     )
     between = (*piece.maneuvers, None) if piece.maneuvers else ()
-    return Plan(
-        piece.start,
-        (*piece.trims, still),
-        durations=[*piece.durations.tolist(), lasting],
-        maneuvers=between,
-        start_time=piece.start_time,
-    )
+    durations = np.append(piece.durations, lasting)
+    return replace(piece, trims=(*piece.trims, still), durations=durations, maneuvers=between)
 
 
 def _held(log: FleetLog, name: str) -> tuple[tuple[float, Plan], ...]:
@@ -298,10 +293,10 @@ def _steps(log: FleetLog) -> Table:
             shown(value, 6),
             f"{spent:.6g}",
             shown(step.distance_m, 3),
-            _several([" and ".join(swap.names) for swap in step.swaps]),
+            few([" and ".join(swap.names) for swap in step.swaps]),
             str(len(step.asked)),
             "; ".join(
-                f"{what}: {_several(names)}"
+                f"{what}: {few(names)}"
                 for what, names in (
                     ("plan void", step.void),
                     ("not let in", step.refused),
@@ -325,11 +320,6 @@ def _spent(log: FleetLog) -> Array:
         for step, cost in log.costs_of(name).items():
             spent[step + 1] += cost
     return np.cumsum(spent)
-
-
-def _several(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def _vehicles(log: FleetLog, driven: DrivenVerdict) -> Table:

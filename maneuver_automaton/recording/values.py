@@ -28,6 +28,11 @@ TIGHT_M = 1e-3  # [m] a clearance that is smaller is remarked on
 NAMELESS = ("Plan", "Closed loop", "Fleet", "Closed loop of a fleet")  # titles that name nothing
 
 
+def few(names: Sequence[str], most: int = 4) -> str:
+    """The first names in a row, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fact:
     """One line of a heading, a table of the terminal, or a folder's row.

@@ -197,7 +197,10 @@ class _Work:
             return None
         cuts = [begin, *([0.5 * (begin + end)] if draws[0] < VIA else []), end]
         pieces = [_cut(trims, times, ends, a, b) for a, b in pairwise(cuts)]
-        goals = [self._moved(piece) for piece in pieces]
+        goals = [  # where each leads, seen from its begin
+            SE2(coasted(np.zeros(3), self.twists[self.number_of[part], :3], lasting)[-1])
+            for part, lasting in pieces
+        ]
         if len(pieces) > 1:
             size = SPREAD * self.query.library.radius * (1.0 / 100.0) ** draws[5]
             via = SE2(shift * np.array([size, size, 0.5 * size / self.query.library.radius]))
@@ -215,12 +218,6 @@ class _Work:
         before, after = _cut(trims, times, ends, 0.0, begin), _cut(trims, times, ends, end, total)
         driven = [*zip(*before, strict=True), *steps, *zip(*after, strict=True)]
         return self._accepted([(int(trim), float(t)) for trim, t in driven])
-
-    def _moved(self, piece: tuple[IntArray, Array]) -> SE2:
-        """Where a piece leads, seen from its begin."""
-        trims, times = piece
-        twists = self.twists[self.number_of[trims], :3]
-        return SE2(coasted(np.zeros(3), twists, times)[-1])
 
     def _solved(
         self, trims: IntArray, times: Array, goal: SE2, spare: float, most: int, rounds: int
@@ -263,7 +260,13 @@ class _Work:
         """A word of trims and times, if it is cheaper, keeps the limits and is free."""
         query = self.query
         found = word_of_steps(((SWITCH, trim, t) for trim, t in driven), goal=self.word.goal)
-        found = replace(found, cost=self._cost(found))
+        prices, numbers = query.library.arrays.library, self.number_of[found.trims]
+        gears = np.sign(self.twists[numbers, 0])
+        gears = gears[gears != 0.0]
+        changes = int(np.count_nonzero(gears[1:] != gears[:-1]))
+        switches = prices.switch * (len(numbers) - 1) + prices.direction_change * changes
+        coasting = float(self.rates[numbers] @ found.durations)  # without what places cost
+        found = replace(found, cost=coasting + switches)
         if not found.cost < self.word.cost * (1.0 - GAIN) or found.duration > query.most_time:
             return None
         if 0 < query.most_trims < len(found.trims) or (found.durations < query.least_coast).any():
@@ -273,15 +276,6 @@ class _Work:
         found = query.with_places(found)
         cheaper = found.cost < self.word.cost * (1.0 - GAIN)
         return found if cheaper and is_free(query, found) else None
-
-    def _cost(self, word: Word) -> float:
-        """Cost of a word, prices of switches and changes of direction included, without places."""
-        prices, numbers = self.query.library.arrays.library, self.number_of[word.trims]
-        gears = np.sign(self.twists[numbers, 0])
-        gears = gears[gears != 0.0]
-        changes = int(np.count_nonzero(gears[1:] != gears[:-1]))
-        switches = prices.switch * (len(numbers) - 1) + prices.direction_change * changes
-        return float(self.rates[numbers] @ word.durations) + switches
 
 
 def with_trims(query: LatticeQuery, choice: Chosen) -> LatticeQuery:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -147,6 +148,20 @@ class _Relaxation:
             rows.append(-np.ones(times.size))
         return np.array(values), np.array(rows).reshape(len(values), times.size)
 
+    def conditions(self, begin: Array) -> list[dict[str, Any]]:
+        """Both kinds of constraints as SciPy takes them, without equalities that others imply."""
+        rows = _independent(self.exact(begin)[1][:, self.first :])
+        asked = [("eq", self.exact, rows), ("ineq", self.room, np.arange(len(self.room(begin)[0])))]
+        return [
+            {
+                "type": kind,
+                "fun": lambda t, of=of, kept=kept: settled(of(t)[0][kept]),
+                "jac": lambda t, of=of, kept=kept: settled(of(t)[1][kept]),
+            }
+            for kind, of, kept in asked
+            if kept.size
+        ]
+
 
 def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     """The cheapest times; None if the solver found none that keep the conditions."""
@@ -162,17 +177,6 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
         longest = np.where(moving & (plan.durations == 0.0), 0.0, longest)
     least[: task.first] = longest[: task.first] = plan.durations[: task.first]
     begin = np.clip(plan.durations, least, longest)
-    rows = _independent(task.exact(begin)[1][:, task.first :])
-    asked = [("eq", task.exact, rows), ("ineq", task.room, np.arange(len(task.room(begin)[0])))]
-    conditions = [
-        {
-            "type": kind,
-            "fun": lambda t, of=of, kept=kept: settled(of(t)[0][kept]),
-            "jac": lambda t, of=of, kept=kept: settled(of(t)[1][kept]),
-        }
-        for kind, of, kept in asked
-        if kept.size
-    ]
 
     costs = task.problem.bound_place_costs
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
@@ -208,7 +212,7 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
             jac=True,
             method="SLSQP",
             bounds=Bounds(least, longest),
-            constraints=conditions,
+            constraints=task.conditions(begin),
             callback=ask,
             options={"maxiter": ITERATIONS, "ftol": roughly},
         )

@@ -246,15 +246,11 @@ def _closed(plan: Plan, controls: Array, columns: Array, lasts: float) -> Plan |
     times, worst = closest_times(conditions, durations)
     if worst > MET * (1.0 + plan.duration):
         return None
-    trims = [
-        Trim(name=_name(control), body_velocity=twist, control=control)
-        for control, twist in zip(controls, twists, strict=True)
-    ]
+    trims = []
+    for control, twist in zip(controls, twists, strict=True):
+        name = f"({', '.join(format(float(one), SHOWN) for one in control)})"
+        trims.append(Trim(name=name, body_velocity=twist, control=control))
     return Plan(plan.start, tuple(trims), durations=times, start_time=plan.start_time)
-
-
-def _name(control: Array) -> str:
-    return f"({', '.join(format(float(one), SHOWN) for one in control)})"
 
 
 def _effort(plan: Plan, weight: Array) -> float:

@@ -138,17 +138,9 @@ class _Word:
         state, controls = source.reduced_state, control[None]
         course = drive(self.model, state, control=controls, durations=[duration])
         self.trims[source.name], self.trims[target.name] = source, target
-        self.primitives.append(
-            Maneuver(
-                name=name,
-                source=source.name,
-                target=target.name,
-                displacement=course.pose[-1],
-                duration=float(course.time[-1]),
-                course=course,
-            )
-        )
-        self.durations.append(float(course.time[-1]))
+        one = Maneuver.along(course, name=name, source=source.name, target=target.name)
+        self.primitives.append(one)
+        self.durations.append(one.duration)
 
 
 def _ratio(limits: Array, sizes: Array) -> Array:
@@ -213,7 +205,8 @@ def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Pr
 def extreme_automaton(automaton: Automaton) -> Automaton:
     """Trims of the kinematic vehicle at the limits of the reduced state, and between at zero."""
     model: StopsAndSteers = automaton.model  # type: ignore[assignment]
-    axes = [_levels(low, high) for low, high in model.reduced_limits]
+    # The limits in falling order, and zero if it lies between.
+    axes = [[high, *([0.0] if low < 0.0 < high else []), low] for low, high in model.reduced_limits]
     kinematic = model.kinematic
     states = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     twists = model.body_velocity(states, np.zeros((len(states), len(model.control_names))))
@@ -224,9 +217,3 @@ def extreme_automaton(automaton: Automaton) -> Automaton:
         for state, _ in moving
     }
     return Automaton.of_controls(kinematic, controls)
-
-
-def _levels(low: float, high: float) -> Array:
-    """The limits in falling order, and zero if it lies between."""
-    inner = [0.0] if low < 0.0 < high else []
-    return np.array([high, *inner, low])

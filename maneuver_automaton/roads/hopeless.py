@@ -155,13 +155,13 @@ def _may_fit(
     return len(poses) > 0
 
 
-def _away(places: Sequence[Shape] | None, points: Any) -> Array:
-    """Distances of shapely geometries (n,) to the nearest of some places; zeros for any place."""
+def _away(places: Sequence[Shape], points: Any) -> Array:
+    """Distances of shapely geometries (n,) to the nearest of some places."""
     apart = [
         shapely.distance(geometry_of(one), points) - (one.radius if isinstance(one, Disc) else 0.0)
-        for one in places or ()
+        for one in places
     ]
-    return np.min(apart, axis=0) if apart else np.zeros(len(points))
+    return np.asarray(np.min(apart, axis=0))
 
 
 def _bodies(middles: Array, size: Array) -> Any:

@@ -258,16 +258,10 @@ class RoadPlanner:
         if plan.reaches or not self.kind:
             return True
         n = len(plan.controls)
-        still = np.array([*self.world(plan.states[n, :3]), 0.0, float(plan.states[n, 4])])
+        still = np.array([*plan.states[n, :3], 0.0, plan.states[n, 4]])
         last = max(float(one.motion.time[-1]) for one in self.kind if one.motion is not None)
         lasting = max(math.ceil((last - self.time_of(plan.tick + n)) / self.tick), 1)
-        stands = plan_of_controls(
-            self.vehicle.model,
-            still,
-            np.zeros((lasting, 2)),
-            tick=self.tick,
-            start_time=self.time_of(plan.tick + n),
-        )
+        stands = self.plan_of(still, np.zeros((lasting, 2)), tick=plan.tick + n)
         off = self.settings.off_traffic_m
         least = (nearest_to(stands, self.vehicle, one, enough=off) for one in self.kind)
         return all(one.distance > off for one in least)
@@ -422,11 +416,8 @@ class RoadPlanner:
     def price(self, plan: RoadDecision, *, ticks: int | None = None) -> float:
         """Cost of a plan, or of its first ticks, its stop left out."""
         n = plan.lasting if ticks is None else ticks
-        return float(
-            _kernels_costs.price(
-                self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n])
-            )
-        )
+        states, controls = np.array(plan.states[: n + 1]), np.array(plan.controls[:n])
+        return float(_kernels_costs.price(self.horizon, states, controls))
 
     def _emergency(self, state: Array, tick: int) -> RoadDecision:
         """Full braking straight on, free or not."""
@@ -446,7 +437,11 @@ def road_planner(
 ) -> RoadPlanner:
     """Everything for driving on a scene, made once."""
     vehicle = vehicle or RoadVehicle()
-    settings = _fitting(settings or RoadSettings(), scene, vehicle)
+    settings, (edge, traffic) = settings or RoadSettings(), kept_at_start(scene, vehicle)
+    if edge < settings.off_edge_m:  # half of what the start keeps, where that keeps less
+        settings = replace(settings, off_edge_m=0.5 * edge)
+    if traffic < settings.off_traffic_m:
+        settings = replace(settings, off_traffic_m=0.5 * traffic)
     tick = tick_of(scene.step)
     wanted = [one.speed for one in scene.goals if one.speed is not None]
     fastest = math.ceil(max(scene.start.speed, *(low for low, _ in wanted), settings.top_speed))
@@ -489,16 +484,6 @@ def road_planner(
         room=beam_arrays(settings, library),
         barriers=closed,
     )
-
-
-def _fitting(settings: RoadSettings, scene: RoadScene, vehicle: RoadVehicle) -> RoadSettings:
-    """Settings whose distances are half of what the start keeps, where that keeps less."""
-    edge, traffic = kept_at_start(scene, vehicle)
-    if edge < settings.off_edge_m:
-        settings = replace(settings, off_edge_m=0.5 * edge)
-    if traffic < settings.off_traffic_m:
-        settings = replace(settings, off_traffic_m=0.5 * traffic)
-    return settings
 
 
 def _last_tick(goals: GoalArrays, settings: RoadSettings, tick: float) -> int:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.roads.lanelets import ROUNDED, Lanelet, along, drivable_area
 from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
@@ -192,13 +191,9 @@ def _straight_on(lanelets: dict[int, Lanelet], number: int, *, known: set[int]) 
         if not after:
             break
 
-        def turn(k: int, ahead: Any = ahead) -> float:
-            step = lanelets[k].center[-1] - lanelets[k].center[-2]
-            return abs(
-                float(np.remainder(np.arctan2(*step[::-1]) - ahead + np.pi, 2 * np.pi) - np.pi)
-            )
-
-        number = min(after, key=turn)
+        steps = [lanelets[k].center[-1] - lanelets[k].center[-2] for k in after]
+        turns = [abs(float(wrapped(np.arctan2(*step[::-1]) - ahead))) for step in steps]
+        number = after[int(np.argmin(turns))]
         known.add(number)
         more.append(number)
         left -= lanelets[number].length

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from maneuver_automaton.roads.arrays import (
     StaticObstacles,
     Weights,
 )
-from maneuver_automaton.roads.lanelets import Lanelet, drivable_area, obstacles_in
+from maneuver_automaton.roads.lanelets import drivable_area, obstacles_in
 from maneuver_automaton.roads.plans import RoadSettings
 from maneuver_automaton.roads.route import (
     ASIDE,
@@ -242,9 +241,14 @@ def clearing_of(
 
 def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
     """A strip of land along the edge of the road as obstacles, to `far` [m] from the start."""
-    x, y = scene.start.middle[:2].tolist()
-    around = shapely.box(x - far, y - far, x + far, y + far)
-    near = tuple(lanelet for lanelet in scene.lanelets if _meets(lanelet, around))
+    low, high = scene.start.middle[:2] - far, scene.start.middle[:2] + far
+    around = shapely.box(*low, *high)
+    rings = [(one, one.ring) for one in scene.lanelets]
+    near = tuple(
+        one
+        for one, ring in rings
+        if (ring.min(axis=0) <= high).all() and (ring.max(axis=0) >= low).all()
+    )
     road = shapely.simplify(shapely.intersection(RECENT.once(drivable_area, near), around), SIMPLER)
     return obstacles_in(shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road))
 
@@ -256,9 +260,3 @@ def _grown(shape: Shape, by: float) -> tuple[Obstacle, ...]:
     outline = united(outlines(shape))
     # Corners become four chords of a quarter circle each, which is that much too small in between.
     return obstacles_in(shapely.buffer(outline, by / math.cos(math.pi / 16.0), quad_segs=4))
-
-
-def _meets(lanelet: Lanelet, box: Any) -> bool:
-    low_x, low_y, high_x, high_y = box.bounds
-    low, high = lanelet.ring.min(axis=0), lanelet.ring.max(axis=0)
-    return bool(low[0] <= high_x and low_x <= high[0] and low[1] <= high_y and low_y <= high[1])

@@ -329,7 +329,10 @@ def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -
     """Step by step, one after another in the order of their names, until all are done."""
     step = min(one.planner.scene.step for one in drivers.values())
     now = min(one.planner.time_of(0) for one in drivers.values())
-    last = max(_end_of(one) for one in drivers.values())
+    last = max(  # when nobody looks at one any more [s]
+        one.planner.time_of(one.limit) + one.planner.settings.horizon_s + LONGEST_STOP
+        for one in drivers.values()
+    )
     number = 0
     while not (all(one.is_done for one in drivers.values()) or stopped()):
         time = now + number * step
@@ -345,12 +348,6 @@ def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -
             if progress is not None:
                 progress()
         number += 1
-
-
-def _end_of(driver: Driver) -> float:
-    """When nobody looks at it any more [s]."""
-    planner = driver.planner
-    return planner.time_of(driver.limit) + planner.settings.horizon_s + LONGEST_STOP
 
 
 def _held(name: str, driver: Driver, last: float) -> Obstacle | None:

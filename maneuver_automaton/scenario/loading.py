@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,12 @@ def load_scenario(
                 return fleet.fleet_of_document(document, path=path, begin=begin, own=model)
             return scenario_of_document(document, path=path, begin=begin, own=model)
         statements = found
-    statement = _chosen(path, statements, case)
+    n = len(statements)
+    if case is None and n > 1:
+        raise InvalidScenario(f"{path}: holds {n} problems, need --case and a number, 0 to {n - 1}")
+    if case is not None and not 0 <= case < n:
+        raise _no_case(path, n, case)
+    statement = statements[case or 0]
     if statement.road is not None:
         vehicle = roads.RoadVehicle() if beside is None else _road_vehicle(Path(beside))
         return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
@@ -238,15 +243,6 @@ def _headings(value: Any, where: Where) -> Iterator[tuple[Where, float]]:
             continue
         if isinstance(inner, int | float):
             yield at, float(inner)
-
-
-def _chosen(path: Path, statements: Sequence[Statement], case: int | None) -> Statement:
-    n = len(statements)
-    if case is None and n > 1:
-        raise InvalidScenario(f"{path}: holds {n} problems, need --case and a number, 0 to {n - 1}")
-    if case is not None and not 0 <= case < n:
-        raise _no_case(path, n, case)
-    return statements[case or 0]
 
 
 def _no_case(path: Path, n: int, case: int) -> InvalidScenario:

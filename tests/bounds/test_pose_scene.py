@@ -9,7 +9,7 @@ from shapely import affinity
 
 from maneuver_automaton import Automaton, Car, Goal, Problem
 from maneuver_automaton.bounds import PoseScene, pose_scene
-from maneuver_automaton.bounds.pose_scene import lasting_obstacles
+from maneuver_automaton.bounds.cells import lasting_obstacles
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel

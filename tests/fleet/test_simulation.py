@@ -22,7 +22,7 @@ from maneuver_automaton import (
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
 from maneuver_automaton.formats.documents import write_document
-from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict, load_fleet_loop
+from maneuver_automaton.formats.fleet_json import fleet_loop_to_dict, load_fleet_loop
 from tests.fleet.robots import (
     at_rest,
     crossing,

@@ -22,8 +22,7 @@ from maneuver_automaton.formats.documents import (
     schema_of,
     write_document,
 )
-from maneuver_automaton.formats.fleet_json import save_fleet
-from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict
+from maneuver_automaton.formats.fleet_json import fleet_loop_to_dict, save_fleet
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.formats.road_json import (
     road_drive_to_dict,

@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting import draw_controls
-from maneuver_automaton.plotting.colors import INK
 from maneuver_automaton.plotting.controls import draw_over_time
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.primitives import Trim
@@ -56,7 +55,7 @@ def test_so_many_switches_that_lines_would_hide_the_steps_have_none():
 def test_a_label_longer_than_its_axes_is_in_lines():
     column = Figure(figsize=(4.0, 5.0)).subplots(4, 1)
     label = "angular acceleration [rad/s²]"
-    draw_over_time(column[0], Track(np.zeros(3), ()), [], label=label, colors=INK)
+    draw_over_time(column[0], Track(np.zeros(3), ()), [], label=label, colors={})
     assert "\n" in column[0].get_ylabel()
 
 

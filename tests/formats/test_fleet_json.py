@@ -13,7 +13,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet, verify_driven
 from maneuver_automaton.formats.closed_loop_json import driven_document
 from maneuver_automaton.formats.documents import read_document, write_document
-from maneuver_automaton.formats.fleet_loop_json import (
+from maneuver_automaton.formats.fleet_json import (
     fleet_loop_to_dict,
     load_fleet_loop,
 )
