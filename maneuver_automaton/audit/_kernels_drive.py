@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
@@ -30,13 +29,19 @@ def evenly(parts: Array) -> Spans:
 
 @kernel
 def cut(
-    stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_], most: float
-) -> TimeElements:
+    stated: Stated, begin_twists: Array, rough: IntArray, most: float, n_nodes: int
+) -> tuple[TimeElements, Array]:
     """Runs of one control within a primitive that turn by no more than `most` [rad], or parts.
 
-    A stretch that stands `alone` is a run, in as many equal parts.
+    A stretch that turns more, or was found to be `rough` so many times, stands alone: it is a run,
+    in equal parts. Twists (e, n_nodes, dof) are those with which the stretches begin.
     """
-    n, total = turns.size, parts.sum()
+    n, dof = begin_twists.shape
+    turns = np.abs(begin_twists[:, 2]) * stated.lengths
+    parts = np.maximum(np.ceil(turns / most), 1.0).astype(np.int64)
+    alone = (parts > 1) | (rough > 0)
+    parts <<= np.maximum(rough - (parts == 1), 0)  # found rough among others, it is whole at first
+    total = parts.sum()
     first, run, runs = np.empty(total, np.int64), np.empty(n, np.int64), np.empty(total, np.int64)
     share, lengths = np.empty(total), np.empty(total)
     count, e, turned, step = 0, 0, 0.0, -1.0
@@ -54,7 +59,10 @@ def cut(
                 e += 1
             count += 1
         run[k] = count - 1
-    return TimeElements(first[:e], share[:e], lengths[:e], runs[:e], run)
+    twists = np.empty((e, n_nodes, dof))
+    for k in range(e):
+        twists[k] = begin_twists[first[k]]
+    return TimeElements(first[:e], share[:e], lengths[:e], runs[:e], run), twists
 
 
 @inner_kernel

@@ -115,15 +115,11 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     if stated is None:
         return _standing(plan, model)
     begin_twists = model.body_velocity(stated.states, stated.controls)
-    turns = np.abs(begin_twists[..., 2]) * stated.lengths
-    parts = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
-    alone = parts > 1
+    rough = np.zeros(stated.lengths.size, dtype=np.int64)
     has_states = bool(stated.states.shape[1])
     for _ in range(HALVINGS):
-        elements = kernels.cut(stated, turns, parts, alone, TURN)
-        first = elements.first
-        twists = np.repeat(begin_twists[first, None], N, axis=1)
-        reduced = WITHOUT
+        elements, twists = kernels.cut(stated, begin_twists, rough, TURN, N)
+        first, reduced = elements.first, WITHOUT
         if has_states:
             begins, controls = stated.states[first], stated.controls[first]
             guess = begins + elements.share[:, None] * (stated.end_states[first] - begins)
@@ -131,12 +127,10 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
             reduced = reduced_states(model, controls, elements.lengths, guess, begun)
             twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
         frames, there = kernels.followed(plan.start.copy(), twists, stated, elements, RULES)
-        rough = ~(np.maximum(reduced.error, frames.error) <= EXACT * (1.0 + frames.length))
-        if not rough.any():
+        fine = np.maximum(reduced.error, frames.error) <= EXACT * (1.0 + frames.length)
+        if fine.all():
             break
-        again = np.isin(elements.run, elements.runs[rough])
-        parts = np.where(again & alone, 2 * parts, parts)
-        alone = alone | again
+        rough += np.isin(elements.run, elements.runs[~fine])
     off, states = there.off, stated.end_states
     if has_states:
         # What a reduced state is off moves the vehicle for as long as it is driven.
@@ -188,12 +182,11 @@ def _standing(plan: Plan, model: Model) -> DrivenPlan:
 def stated_by(plan: Plan) -> Stated | None:
     """The stretches of a plan, trims whole, maneuvers from sample to sample; None of no time."""
     poses, lengths = plan.switching_poses, plan.primitive_durations
-    lasting = (lengths > NOTHING).nonzero()[0]
+    lasting = (lengths > NOTHING).nonzero()[0].tolist()
     rows: list[Stated] = []
     # Trims that follow each other are one run; every maneuver stands alone.
-    for _, run in groupby(
-        lasting.tolist(), key=lambda k: -1 if isinstance(plan.primitives[k], Trim) else k
-    ):
+    kinds = [-1 if isinstance(one, Trim) else k for k, one in enumerate(plan.primitives)]
+    for _, run in groupby(lasting, key=kinds.__getitem__):
         numbers = list(run)
         first, *others = [plan.primitives[k] for k in numbers]
         if isinstance(first, Maneuver):

@@ -195,7 +195,7 @@ def audit_plan(
     reasons += _beyond_limits(drive)
     ends = ("begins", near.trims[:1]), ("ends", near.trims[-1:])
     for (what, trims), state in zip(ends, states or (), strict=states is not None):
-        for trim in trims:
+        for trim in trims if state.size else ():
             off = np.abs(trim.reduced_state - state).max(initial=0.0)
             if off > STATE_TOLERANCE:
                 reasons.append(f"it {what} in trim {trim.name!r}, {off:.3g} off the reduced state")
@@ -365,22 +365,20 @@ def _keeps(least: Least, enough: float) -> bool:
 
 def _beyond_limits(drive: DrivenPlan) -> list[str]:
     """What exceeds a limit of the model, and by how much."""
-    reasons: list[str] = []
-    model = drive.model
+    reasons, model = list[str](), drive.model
     if not drive.ends.size:
         return reasons
     for names, limits, values in (
         (model.reduced_names, model.reduced_limits, drive.sampled_states),
         (model.control_names, model.control_limits, drive.controls),
     ):
-        if not names:
+        if ((limits[:, 0] <= values) & (values <= limits[:, 1])).all():
             continue
         excess = np.maximum(values.max(axis=0) - limits[:, 1], limits[:, 0] - values.min(axis=0))
         for name, over, (low, high) in zip(names, excess.tolist(), limits.tolist(), strict=True):
             size = max([1.0, *(abs(limit) for limit in (low, high) if math.isfinite(limit))])
             if over > LIMIT_TOLERANCE * size:
-                beyond = f"beyond its limits [{low:.6g}, {high:.6g}]"
-                reasons.append(f"{name} is {over:.3g} {beyond}")
+                reasons.append(f"{name} is {over:.3g} beyond its limits [{low:.6g}, {high:.6g}]")
     limit = getattr(model, "max_lateral_acceleration", None)
     if limit is not None:
         spans, _ = drive.between_samples()
@@ -465,8 +463,9 @@ def zones_broken(
         ]
         least = min(found, key=lambda one: one.distance, default=NEVER)
         if not least.distance > CONTACT:
-            moves = f"the vehicle moves as {zone.words} does not admit"
-            reasons.append(f"at {least.time:.6g} s {moves}")
+            reasons.append(
+                f"at {least.time:.6g} s the vehicle moves as {zone.words} does not admit"
+            )
     return reasons
 
 

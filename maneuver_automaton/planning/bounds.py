@@ -86,20 +86,23 @@ def straight_bound(problem: Problem, goals: Sequence[Goal]) -> float:
 
     It holds whatever the trims at both ends are.
     """
+    cost = terms_of(problem.cost)
+    far = [(goal, goal.off(problem.start)[0]) for goal in goals]
+    straight = min(max(0.0, off - goal.tolerance_m) for goal, off in far)
+    known = cost.length * straight if cost else 0.0
+    if cost:
+        known += cost.time * min(_quickest(problem, goal, off) for goal, off in far)
+    return known if problem.has_states else max(known, straight * _price_of_words(problem.setting))
+
+
+@kept_by_first
+def _price_of_words(setting: Problem) -> float:
+    """Cost per metre of the cheapest word, where all plans are words of the library; else 0."""
     from maneuver_automaton.planning.polishing import why_not_polished
     from maneuver_automaton.refinement.stop_and_steer import follows_paths
 
-    model, cost = problem.automaton.model, terms_of(problem.cost)
-    far = [(goal, goal.off(problem.start)[0]) for goal in goals]
-    straight = min(max(0.0, off - goal.tolerance_m) for goal, off in far)
-    known = 0.0
-    if cost:
-        known = cost.time * min(_quickest(problem, goal, off) for goal, off in far)
-        known += cost.length * straight
-    words = why_not_polished(problem) and not follows_paths(model)
-    if words and not problem.has_states:  # all plans are words of the library
-        known = max(known, straight * least_price_per_metre(problem.automaton, problem.cost))
-    return known
+    words = why_not_polished(setting) and not follows_paths(setting.automaton.model)
+    return least_price_per_metre(setting.automaton, setting.cost) if words else 0.0
 
 
 def bound_along_paths(problem: Problem) -> LowerBound:

@@ -98,18 +98,19 @@ def check_plan(
         courses = [m.course for m in plan.maneuvers if m is not None and m.course is not None]
         samples = sum(len(course.time) for course in courses) if problem.obstacles else 0
         _ask(budget, AUDIT_S + SAMPLE_S * samples * (1 + len(problem.parts)))
-        prices = problem.place_prices_of(plan) if problem.place_costs else ()
-        refused = min((one.refused for one in prices if one.refused is not None), default=None)
-        if refused is not None:
-            reason = f"at {refused:.6g} s it is where a place cost does not allow it"
-            return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
-        bound = problem.bound_place_costs if prices else ()
-        both = zip(problem.place_costs, bound, strict=True)
-        places = StatedPrices(  # the audit has distances of its own
-            costs=tuple(one if isinstance(one, Clearance) else known for one, known in both),
-            prices=tuple(one.price for one in prices),
-            whole=problem.cost_of(plan) if prices else 0.0,
-        )
+        places = None
+        if problem.place_costs:
+            prices = problem.place_prices_of(plan)
+            refused = min((one.refused for one in prices if one.refused is not None), default=None)
+            if refused is not None:
+                reason = f"at {refused:.6g} s it is where a place cost does not allow it"
+                return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
+            both = zip(problem.place_costs, problem.bound_place_costs, strict=True)
+            places = StatedPrices(  # the audit has distances of its own
+                costs=tuple(one if isinstance(one, Clearance) else known for one, known in both),
+                prices=tuple(one.price for one in prices),
+                whole=problem.cost_of(plan),
+            )
         arrived = goal if problem.automaton.lattice is None else replace(goal, pose=plan.end)
         audit = audit_plan(
             plan,
@@ -314,10 +315,11 @@ def _coasts_within_reach(
 ) -> tuple[IntArray, Array, Array, Array]:
     """The parts of trims in which the altitude is within the margin of a layer."""
     # Numbers of their primitives (m,), starts (m, 3), twists (m, 3) and durations (m,) [s].
-    kinds = [isinstance(one, Trim) for one in plan.primitives] if plan.maneuvers else []
-    number = np.flatnonzero(kinds) if kinds else np.arange(len(plan.trims))
-    velocity, lasting = plan.twists[number], plan.primitive_durations[number]
-    start = plan.switching_poses[number]
+    number = np.arange(len(plan.primitives))
+    velocity, lasting, start = plan.twists, plan.primitive_durations, plan.switching_poses[:-1]
+    if plan.maneuvers:
+        number = np.flatnonzero([isinstance(one, Trim) for one in plan.primitives])
+        velocity, lasting, start = velocity[number], lasting[number], start[number]
     if not (math.isinf(layer.high) or plan.start.size == 3):
         low = layer.low - problem.body_height[1] - problem.margin - start[:, 3]
         high = layer.high - problem.body_height[0] + problem.margin - start[:, 3]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit import Audit, TerminalError, terminal_error
+from maneuver_automaton.audit import Audit, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.budget import FIRST_LATE, Budget
@@ -201,15 +201,15 @@ class Incumbents:
         """
         if any(one.plan is plan for one in self.plans):
             return True
-        none_fits, goal = True, self.problem.goals[goal_index]
-        for fitted in fitted_plans(self.problem, plan, goal, budget=self.for_checks):
+        none_fits, goal, budget = True, self.problem.goals[goal_index], self.for_checks
+        for fitted in fitted_plans(self.problem, plan, goal, budget=budget):
             none_fits = False
             lasting = self._with_lasting_coasts(fitted, goal)
             if lasting is not fitted and self._keep(lasting, goal_index, fitted, proven=False):
                 return True
             if self._keep(fitted, goal_index, fitted, proven=proven):
                 return True
-        if none_fits and self.for_checks.left_to_check == 0.0:
+        if none_fits and budget.left_to_check == 0.0:
             self.unchecked += 1
         elif none_fits and proven:
             reason = broken_condition(self.problem, padded(self.problem, plan))
@@ -403,12 +403,14 @@ class Incumbents:
             gap=bound.gap(best.cost),
             bound=bound,
             certificate=certificate,
-            terminal_error=self._terminal_error(best),
+            terminal_error=terminal_error(best.plan, self.problem.goals[best.goal_index]),
             clearance_m=best.audit.min_clearance_m,
             audit=best.audit,
             alternatives=tuple(
                 Alternative(
-                    plan=other.plan, cost=other.cost, terminal_error=self._terminal_error(other)
+                    plan=other.plan,
+                    cost=other.cost,
+                    terminal_error=terminal_error(other.plan, self.problem.goals[other.goal_index]),
                 )
                 for other in sorted(others, key=lambda one: one.cost)
             ),
@@ -428,10 +430,6 @@ class Incumbents:
             counts=dict(self.counts),
             nodes=nodes,
         )
-
-    def _terminal_error(self, one: Accepted) -> TerminalError:
-        """How far its last pose is from its goal."""
-        return terminal_error(one.plan, self.problem.goals[one.goal_index])
 
     def _timing(self, searched: float) -> dict[str, float]:
         refined = max(self.budget.elapsed - searched - self.checking, 0.0)

@@ -144,11 +144,10 @@ class LatticeWords(PlanningStep):
         Where there is no plan, the last of it is for a proof that there is none.
         """
         problem, ended, prepared = found.problem, found.ended, found.workspace.prepared
-        begun, ends = ended.begun, None
-        goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
-        if begun is not None:
-            ends = begun.call.arrays.seen[:, :3].copy(), begun.call.arrays.clear.copy()
-        query = self.query = lattice_query(problem, goals, prepared=prepared, ends=ends)
+        begun = ended.begun
+        goals = range(len(problem.goals)) if begun else goals_left(problem)
+        query = None if begun is None else begun.query_of(problem)
+        query = self.query = query or lattice_query(problem, goals, prepared=prepared)
         known = self.finds_plans
         self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
         query = self.query = query if known else late_at_first(query)
@@ -182,7 +181,7 @@ class LatticeWords(PlanningStep):
                     word = with_waits(query, path.word) or with_waits(close, path.word)
         if word is None:
             freely = _steered_freely(problem)  # finds at once what a price hides for long
-            easy = lattice_query(freely, goals, prepared=prepared, ends=ends) if freely else query
+            easy = lattice_query(freely, goals, prepared=prepared) if freely else query
             aside = along_free_path(easy, self.table)
             proven = functools.partial(proven_apart, problem)
             first = first_plan(

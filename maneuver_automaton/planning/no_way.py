@@ -203,8 +203,6 @@ class _Following:
             expansions=expansions,
             queries=queries,
             exhausted=answer is Reachability.SEPARATED,
-            enclosed="",
-            nearest=(math.inf, math.inf),
         )
 
     def _go_on(self, budget: Budget) -> tuple[bool, int, int]:

@@ -84,7 +84,7 @@ def answer(
                 step.offer(found)
     finally:
         if ended.begun is not None:  # whose memory serves the next query
-            beginning.end(problem, ended.begun, workspace.prepared)
+            ended.begun.free.append(ended.begun.call)
     if ended.verdict is not None:
         return ended.verdict
     if not ended.is_complete:

@@ -222,12 +222,14 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
                 mark = grid.mark[there]
                 if mark in (BLOCKED, SETTLED):
                     continue
+                step = DIAGONAL if a != 0 and b != 0 else STRAIGHT
+                if mark == REACHED and rank + step >= grid.rank[there]:
+                    continue  # no step into a cell is cheaper, whatever the field says of it
                 # The field is asked once for a blocked cell: then its mark says it.
                 room = centre_clearance(grid, field, n_i, n_j)
                 if room < walls.inflation:
                     grid.mark[there] = BLOCKED
                     continue
-                step = DIAGONAL if a != 0 and b != 0 else STRAIGHT
                 if room < walls.wanted:
                     step *= NARROW
                 if priced:

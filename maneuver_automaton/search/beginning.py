@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._compile import bound
+from maneuver_automaton._compile import bound, called_again
 from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.collision.world import frame_at_first
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search._kernels_lattice import expand
 from maneuver_automaton.search.arrays import FirstCallArrays, LatticeSearch, Margins
 from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.distance_grid import laid_grid, with_cells
@@ -55,7 +56,9 @@ class FirstCall:
 
     arrays: FirstCallArrays
     search: LatticeSearch
+    query: LatticeQuery  # of which ends, window and margin are the query's own
     run: Callable[[], int]
+    expand: Callable[..., int]  # that goes on: no types are looked at, which are those of `search`
     resolution: Resolution
     steps: int  # expansions
     takes: float  # [s] about, the first of them
@@ -66,12 +69,29 @@ class Begun:
     """A query whose first expansions are done; its ends are clearly free."""
 
     call: FirstCall
+    free: list[FirstCall]  # where it is left for the next query
     may_go_on: bool
 
     @property
     def is_found(self) -> bool:
         """Whether a connection was found."""
         return bool(self.call.search.arrays.state[layout.FOUND])
+
+    def query_of(self, problem: Problem) -> LatticeQuery:
+        """What `lattice_query` makes of it, with all of its goals."""
+        call, known, seen = self.call.arrays, self.call.query, self.call.arrays.seen.copy()
+        edges, margin = known.around.edge_window.copy(), float(call.margin[0])
+        return replace(
+            known,
+            problem=problem,
+            around=known.around._replace(
+                margin=margin, window=known.window.copy(), edge_window=edges
+            ),
+            start=seen[0],
+            goals=seen[1:],
+            goal_poses=call.poses[1:].copy(),
+            box=call.window_box.copy(),
+        )
 
     def search_of(self, query: LatticeQuery) -> Pass:
         """The search that was begun, ready to go on."""
@@ -88,6 +108,7 @@ class Begun:
             pace=Pace(UNLIMITED, steps=call.steps),
             alive=self.may_go_on,
             begun_with=int(search.arrays.state[layout.EXPANSIONS]),
+            expand=call.expand,
         )
 
 
@@ -136,12 +157,7 @@ def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
     if said == kernels.NOT_BEGUN:
         free.append(call)
         return None
-    return Begun(call=call, may_go_on=bool(said))
-
-
-def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
-    """Leave the call to the next query."""
-    _first_calls(problem, prepared).free.append(begun.call)
+    return Begun(call=call, free=free, may_go_on=bool(said))
 
 
 def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
@@ -176,6 +192,7 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         grid=with_cells(grid, cells)._replace(prices=query.least_prices(grid)),
         table=NO_TABLE,
     )
+    bound(expand, search, 0, math.inf)  # compiled for these types
     n = 1 + len(query.goals)
     turn = float(world.frame[2])
     x, y = (pair or (-math.inf, math.inf) for pair in (bounds.x, bounds.y))
@@ -202,7 +219,9 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
     return FirstCall(
         arrays=arrays,
         search=search,
+        query=query,
         run=bound(kernels.begin_search, arrays, search),
+        expand=called_again(expand),
         resolution=first,
         steps=steps,
         takes=first_takes(library.arrays, task),

@@ -22,7 +22,7 @@ from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search._kernels_distance import AT_RIM, corner_path, distances
-from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
+from maneuver_automaton.search.arrays import CostTable, DistanceGrid
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.distance_grid import OCTILE, distance_grid
@@ -56,9 +56,10 @@ class FirstPlan:
     word: Word | None
     expansions: int
     queries: int  # collision queries
-    exhausted: bool  # every resolution was tried to its end
-    enclosed: str  # why no plan can exist, if the plane alone proves it
-    nearest: tuple[float, float]  # [m, rad] of the pose that came nearest to a goal from it
+    exhausted: bool = False  # every resolution was tried to its end
+    enclosed: str = ""  # why no plan can exist, if the plane alone proves it
+    # [m, rad] of the pose that came nearest to a goal from it
+    nearest: tuple[float, float] = (math.inf, math.inf)
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of the expanded nodes, if asked for
 
 
@@ -79,6 +80,14 @@ def first_plan(
     again where it ends without one; if that is exhausted, so is all. Whether it `is_proven` that
     there is none is asked before that, the second time for so many times the work.
     """
+    if begun is not None and begun.is_found:
+        search = begun.search_of(query)
+        return FirstPlan(
+            word=search.run(0, math.inf, budget=budget),
+            expansions=search.expansions,
+            queries=search.queries,
+            nodes=expanded(query, [search]),
+        )
     schedule = schedule_of(query.library)
     guides = _Guides(query, table)
     room = 2**62 if budget.expansions is None else budget.expansions
@@ -86,8 +95,8 @@ def first_plan(
     turns = _turns(guides, schedule, first_resolutions(query.library, query.problem.search))
     if begun is not None:
         turns[0].begun = begun.search_of(query)
-        if not begun.is_found:
-            guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
+        guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
+        guides.expand = begun.call.expand
     word, proof, total, queries, left_out, other, none = None, "", 0, 0, False, None, False
     proofs = list(PROOFS if is_proven else ())
     while word is None:
@@ -143,9 +152,7 @@ def first_plan(
         exhausted=none or (word is None and not alive and not left_out),
         enclosed=proof,
         nearest=min(ahead, default=(math.inf, math.inf)),
-        nodes=expanded(query, [one.arrays for one in passes])
-        if query.problem.search.show_nodes
-        else None,
+        nodes=expanded(query, passes),
     )
     for search in passes:
         if begun is None or search is not turns[0].begun:  # its arrays are those of the first call
@@ -159,6 +166,7 @@ class _Guides:
 
     query: LatticeQuery
     table: CostTable
+    expand: Callable[..., int] | None = None  # for searches of the query, if it is known
     fine_grids: Grids | None = None
     coarse_grids: dict[float, DistanceGrid] = field(default_factory=dict)
 
@@ -217,6 +225,8 @@ class _Turn:
             sign=self.sign,
             table=self.guides.table if self.resolution.guided and not back else NO_TABLE,
         )
+        if self.guides.expand and not back:
+            self.begun.expand = self.guides.expand
         return self.begun
 
 
@@ -271,10 +281,12 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     return ""
 
 
-def expanded(query: LatticeQuery, searches: Iterable[SearchArrays]) -> Array:
-    """Poses (n, 4) of the nodes that were expanded, in the problem's frame, and their costs."""
+def expanded(query: LatticeQuery, passes: Iterable[Pass]) -> Array | None:
+    """Poses of expanded nodes in the problem's frame, and their costs (n, 4), if asked for."""
+    if not query.problem.search.show_nodes:
+        return None
     rows = []
-    for one in searches:
+    for one in (search.arrays for search in passes):
         n = int(one.state[layout.N_NODES])
         closed = (one.links[:n, layout.CLOSED] == 1) & np.isfinite(one.nodes[:n, layout.COST])
         shown = [layout.X, layout.Y, layout.HEADING, layout.COST]

@@ -152,14 +152,12 @@ def lattice_query(
     *,
     prepared: Prepared = RECENT,
     library: LatticeLibrary | None = None,
-    ends: tuple[Array, Array] | None = None,
 ) -> LatticeQuery:
     """The query of a search from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will begins and ends in any trim. Unless it does so in a plane,
     several headings are asked for where any will do: best times then let the heading go. A fixed
-    time is a longest one, since rest fills it. A `library` takes the place of the usual one; `ends`
-    of a vehicle in the plane, as in `ends_of`, are not looked at again.
+    time is a longest one, since rest fills it. A `library` takes the place of the usual one.
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
@@ -179,7 +177,7 @@ def lattice_query(
     seen = np.zeros((len(poses), 4))
     if turns and not (problem.parts or problem.moves):
         asked = [0, *(1 + k for k in index)]
-        seen[:, :3], clear = (one[asked] for one in ends or ends_of(problem))
+        seen[:, :3], clear = (one[asked] for one in ends_of(problem))
         clear = clear - problem.margin
     else:
         seen[:, :3] = worlds.whole.into(poses[:, :3])

@@ -57,9 +57,13 @@ def test_a_motion_and_its_bounds(dof):
 def test_runs_hold_one_control_of_one_primitive_and_turn_little():
     rng = np.random.default_rng(1)
     for _ in range(20):
-        of, turns, alone = stated(rng), rng.uniform(0.0, 0.5, 9), rng.random(9) < 0.2
-        parts = np.where(alone, 3, 1)
-        found = kernels.cut(of, turns, parts, alone, TURN)
+        of, rough = stated(rng), rng.integers(0, 2, 9) * rng.integers(0, 3, 9)
+        wide = rng.random(9) < 0.2
+        turns, alone = rng.uniform(0.0, 0.5, 9) + 2.0 * TURN * wide, wide | (rough > 0)
+        parts = np.where(wide, 3 * 2**rough, 2 ** np.maximum(rough - 1, 0))
+        twists = of.twists * [1.0, 1.0, 0.0] + [[0.0, 0.0, 1.0]] * (turns / of.lengths)[:, None]
+        found, along = kernels.cut(of, twists, rough, TURN, N)
+        assert (along == np.repeat(twists[found.first][:, None], N, axis=1)).all()
         passed = np.floor(before(turns)[:-1] / TURN)
         same = (of.controls[1:] == of.controls[:-1]).all(axis=1)
         same &= (of.pieces[1:] == of.pieces[:-1]) & (passed[1:] == passed[:-1])
@@ -79,9 +83,7 @@ def test_what_is_stated_is_compared_where_it_ends(off):
     of = stated(np.random.default_rng(2), n=2)._replace(
         lengths=np.array([1.0, 2.0]), controls=twists[:, :2].copy(), twists=twists
     )
-    turns, alone = np.array([0.0, 1.0]), np.array([False, True])
-    elements = kernels.cut(of, turns, np.array([1, 2]), alone, TURN)
-    along = np.repeat(twists[elements.first][:, None], N, axis=1)
+    elements, along = kernels.cut(of, twists, np.zeros(2, dtype=np.int64), TURN, N)
     ends = np.array([[1.0, 0.0, 0.0], [1.0 + 2.0 * np.sin(1.0), 2.0 - 2.0 * np.cos(1.0), 1.0]])
 
     def compared(of):

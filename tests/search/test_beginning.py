@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from maneuver_automaton._kept import Prepared
+from maneuver_automaton._kernel_files import kinds_of
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.planning import Planner, plan
-from maneuver_automaton.problem import Problem, SearchSettings
+from maneuver_automaton.problem import Bounds, Problem, SearchSettings
 from maneuver_automaton.search import beginning
+from maneuver_automaton.search.lattice import distance_grids
+from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_task import first_resolutions
 from tests.scenes import CAR_BODY, differential_robot, random_scene, reeds_shepp, room_queries
 from tests.search.cases import compiled_only
 
@@ -49,6 +55,27 @@ def test_what_is_not_begun_is_planned_all_the_same(start, goal) -> None:
     assert beginning.begin(near, prepared, UNLIMITED) is not None
     found, alone = planner.plan(start, goal), plan(query)
     assert (found.status, found.cost) == (alone.status, alone.cost)
+
+
+@compiled_only
+@pytest.mark.parametrize("bounds", [Bounds(), Bounds(x=(-90.0, 90.0), y=(-90.0, 90.0))])
+@pytest.mark.parametrize("free_heading", [False, True])
+def test_a_query_that_was_begun_is_what_a_query_is(free_heading: bool, bounds: Bounds) -> None:
+    """To the last bit, and of the same types: those of its searches are not looked at again."""
+    first, *others = room_queries(3, boxes=25)
+    goals = [replace(goal, free_heading=free_heading) for one in others for goal in one.goals]
+    problem, prepared = replace(first, goals=tuple(goals), bounds=bounds), Prepared()
+    one = begun(problem, prepared)
+    assert one is not None
+    seen, query = one.query_of(problem), lattice_query(problem, (0, 1), prepared=prepared)
+    for name in ("start", "goals", "goal_poses", "box", "free_heading", "goal_index", "most_time"):
+        assert np.array_equal(getattr(seen, name), getattr(query, name)), name
+    assert all(map(np.array_equal, seen.around[1:8], query.around[1:8]))
+    searches = [one.search_of(seen)]
+    for each in first_resolutions(seen.library, problem.search):
+        for grid, sign in zip(distance_grids(seen), (1.0, -1.0), strict=True):
+            searches.append(pass_of(seen, each, grid=grid, sign=sign))
+    assert {kinds_of(each.search) for each in searches} == {kinds_of(one.call.search)}
 
 
 @compiled_only  # otherwise the time is over first
