@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,10 @@ from maneuver_automaton.primitives import Maneuver
 
 def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> IntArray:
     """Indices, rising, of the trims reached from `start` that lead to one of `goals`."""
-    classes, (graph, against) = automaton.trim_classes, _graphs(automaton)
-    ahead = _reached(graph, [int(classes[start])])
-    back = _reached(against, sorted({int(classes[goal]) for goal in goals}))
+    classes, (sources, targets) = automaton.trim_classes, automaton.maneuver_classes.T
+    nodes = np.zeros((2, int(classes.max()) + 1), dtype=np.bool_)
+    nodes[0, classes[start]] = nodes[1, classes[np.fromiter(goals, np.int64)]] = True
+    ahead, back = _reached(nodes[0], sources, targets), _reached(nodes[1], targets, sources)
     return np.flatnonzero((ahead & back)[classes])
 
 
@@ -36,17 +36,6 @@ def part_between(automaton: Automaton, start: int, goals: tuple[int, ...]) -> Au
 
 
 @kept_by_first
-def _graphs(automaton: Automaton) -> tuple[Any, Any]:
-    """Which classes of trims maneuvers link, along them and against them."""
-    from scipy.sparse import csr_array
-
-    n = int(automaton.trim_classes.max()) + 1
-    sources, targets = automaton.maneuver_classes.T
-    graph = csr_array((np.ones(len(sources), dtype=np.int8), (sources, targets)), shape=(n, n))
-    return graph, graph.T.tocsr()
-
-
-@kept_by_first
 def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
     trims = tuple(automaton.trims[k] for k in kept)
     names = {trim.name for trim in trims}
@@ -56,12 +45,10 @@ def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
     return Automaton(automaton.model, trims, maneuvers, name=automaton.name)
 
 
-def _reached(graph: Any, nodes: list[int]) -> NDArray[np.bool_]:
-    from scipy.sparse.csgraph import breadth_first_order
-
-    found: NDArray[np.bool_] = np.zeros(graph.shape[0], dtype=np.bool_)
-    for node in nodes:
-        found[breadth_first_order(graph, node, return_predecessors=False)] = True
+def _reached(found: NDArray[np.bool_], sources: IntArray, targets: IntArray) -> NDArray[np.bool_]:
+    """All nodes that links lead to from those found, one link further each time."""
+    while (fresh := targets[found[sources] & ~found[targets]]).size:
+        found[fresh] = True
     return found
 
 

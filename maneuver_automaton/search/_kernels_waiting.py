@@ -26,6 +26,7 @@ from maneuver_automaton.search.arrays import PathArrays, PathSearch
 HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer
 MOST_ASKED = 20_000  # departures tried in all
+ROUNDED = 1e-9  # [s] by which sums of durations may be off
 FREE, UNKNOWN = -1, -2  # in whose way a departure is
 USED, QUEUED = range(2)  # places in `path.state`
 JOINT, PARENT = range(2)  # columns of `path.links`
@@ -42,35 +43,44 @@ def earliest_arrival(search: PathSearch) -> int:
     """
     path, lib, scene, limits = search.path, search.library, search.scene, search.limits
     clock, tick, quiet = limits.clock, search.tick, search.quiet
-    n, asked = path.trims.shape[0], 0
+    n, asked, last = path.trims.shape[0], 0, math.inf
     path.state[USED] = path.state[QUEUED] = 0
     if search.rest >= 0:  # what never moves is in the way at all times: none need be tried
         for joint in range(n):
             trim, t = path.trims[joint], path.durations[joint]
             if not clear_of_static(scene, lib, trim, _pose(path, joint), t):
                 return -1
+        # What is in the way for ever once it rests has to be passed before: who leaves this joint,
+        # or one before it, too late for that never ends the path.
+        for joint in range(n - 1, -1, -1):
+            last -= path.durations[joint]
+            m, _ = _in_the_way(search, joint, quiet + 1.0, (FREE, 0.0))
+            if m >= 0:
+                moving = scene.layers.first.moving
+                rests = max(moving.time[moving.first_knot[m + 1] - 1], moving.present[m, 0])
+                last = min(last, rests - clock)
+            path.last[joint] = last
     _reach(search, 0, 0.0, -1, 0.0)
     while path.state[QUEUED] > 0:
         state = pop(path.keys, path.items, path.state[QUEUED])
         path.state[QUEUED] -= 1
         joint, arrival = path.links[state, JOINT], path.times[state, ARRIVAL]
-        pose = _pose(path, joint)
         if joint == n:
-            last = path.trims[n - 1]
-            if may_stay(scene, lib, last, pose, clock + arrival, limits.stay_until):
+            pose, trim = _pose(path, n), path.trims[n - 1]
+            if may_stay(scene, lib, trim, pose, clock + arrival, limits.stay_until):
                 return state
             continue
         t, met = path.durations[joint], (FREE, 0.0)
         # Departures are tried a tick apart; where the way is blocked for long, ever further apart.
-        leave, until, step, blocked = arrival, path.times[state, UNTIL], 0.0, 0
-        while leave <= until and leave + t <= limits.most_time and asked < MOST_ASKED:
+        leave, step, blocked = arrival, 0.0, 0
+        until = min(path.times[state, UNTIL], limits.most_time - t)
+        while leave <= until and leave - step <= path.last[joint] + ROUNDED and asked < MOST_ASKED:
             asked += 1
             hit = _in_the_way(search, joint, leave, met)
             if hit[0] != FREE:
                 if leave > quiet:
                     break  # nothing moves any more
-                met = hit
-                step = tick * (1 + blocked // PATIENT)
+                met, step = hit, tick * (1 + blocked // PATIENT)
                 leave, blocked = leave + step, blocked + 1
                 continue
             if blocked > 0:  # when exactly it is free again
@@ -88,7 +98,7 @@ def earliest_arrival(search: PathSearch) -> int:
             if leave > quiet:
                 break
             # What arrives while it may stand there anyway is of no use.
-            leave, blocked = max(leave, stands - t) + tick, 0
+            leave, step, blocked = max(leave, stands - t) + tick, 0.0, 0
     return -1
 
 

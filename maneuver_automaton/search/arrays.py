@@ -358,6 +358,7 @@ class PathArrays(NamedTuple):
     times: Array  # (s, 3) arrival, until when it may stand there, departure from the parent [s]
     before: IntArray  # (s,) the state of the same joint that was found before, -1 for none
     latest: IntArray  # (n + 1,) the state of each joint that was found last, -1 for none
+    last: Array  # (n,) [s] who leaves a joint later never ends the path
     keys: Array  # (s,) of the open list
     items: IntArray  # (s,)
     state: IntArray  # (2,) states in use, and those in the open list

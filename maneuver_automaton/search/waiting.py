@@ -31,25 +31,27 @@ def with_waits(query: LatticeQuery, word: Word, *, hurried: bool = False) -> Wor
     Source: Phillips, Likhachev (2011), *SIPP: Safe Interval Path Planning for Dynamic
     Environments*, ICRA, here along one path.
     """
-    library = query.library.arrays
-    twists = library.library.twists
-    still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
+    library = query.library.arrays.library
+    still = np.flatnonzero(~library.twists[: library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
     # An empty word is a body that stands: a piece of no duration, in any trim.
-    stands = np.array([max(rest, 0)]), np.zeros(1)
-    path = _path_of(query, *(_pieces(word, query) if len(word.trims) else stands))
-    state = _arrival(query, path, rest)
-    if state < 0:
+    trims, durations = np.array([max(rest, 0)]), np.zeros(1)
+    if len(word.trims):  # cut into pieces of about equal length
+        longest = float(word.durations.sum()) / MOST_PIECES
+        counts = np.maximum(1, np.ceil(word.durations / longest).astype(int))
+        trims = np.repeat(query.library.number_of[word.trims], counts)
+        durations = np.repeat(word.durations / counts, counts)
+    path = _path_of(query, trims, durations)
+    if (state := _arrival(query, path, rest)) < 0:
         return None
     if not len(word.trims):
         return with_cost(word, query)
     ways = [_with_rests(path, state, rest)]
-    if not hurried or library.library.switch > 0.0:
+    if not hurried or library.switch > 0.0:
         ways.append(_with_fewer_rests(query, ways[0], rest))
-    words = []
-    for one in ways:
-        driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in one]
-        words.append(with_cost(query.word_of(driven, word.goal), query))
+    numbers = query.library.trims
+    driven = [[(SWITCH, int(numbers[trim]), t) for trim, t in one] for one in ways]
+    words = [with_cost(query.word_of(one, word.goal), query) for one in driven]
     return min(words, key=lambda timed: timed.cost)
 
 
@@ -79,9 +81,8 @@ def is_free(query: LatticeQuery, word: Word) -> bool:
 
     Its trims are in the library of the query.
     """
-    library = query.library.arrays
     numbers = query.library.number_of[word.trims]
-    twists = library.library.twists[numbers, :3]
+    twists = query.library.arrays.library.twists[numbers, :3]
     poses = coasted(query.start[:3], twists, word.durations)
     if not _inside(query.window, poses[:-1], twists, word.durations):
         return False
@@ -111,6 +112,7 @@ def _path_of(
         times=np.empty((states, 3)),
         before=np.empty(states, dtype=np.int64),
         latest=np.full(len(trims) + 1, -1, dtype=np.int64),
+        last=np.full(len(trims), np.inf),
         keys=np.empty(states),
         items=np.empty(states, dtype=np.int64),
         state=np.zeros(2, dtype=np.int64),
@@ -120,9 +122,8 @@ def _path_of(
 def _arrival(query: LatticeQuery, path: PathArrays, rest: int) -> int:
     """The state in which a path ends first, if it may wait in the trim `rest`; -1 for none."""
     quiet = max(query.world.last_event - query.problem.start_time, 0.0)
-    library, limits = query.library.arrays, limits_of(query)
-    search = PathSearch(path, library, query.scene(), limits, quiet, rest, TICK)
-    return int(kernels.earliest_arrival(search))
+    known = query.library.arrays, query.scene(), limits_of(query)
+    return int(kernels.earliest_arrival(PathSearch(path, *known, quiet, rest, TICK)))
 
 
 def _inside(window: Array, poses: Array, twists: Array, durations: Array) -> bool:
@@ -136,23 +137,12 @@ def _inside(window: Array, poses: Array, twists: Array, durations: Array) -> boo
     after = before @ SE2.exp(times[:, None] * twists[steps])
     lengths = np.hypot(twists[steps, 0], twists[steps, 1]) * times
     bulge = 0.5 * lengths * np.tan(0.25 * np.abs(twists[steps, 2]) * times)  # at most: of chords
-    slack = window[8] - bulge
-    for place in (before.pose[:, :2], after.pose[:, :2]):
-        x, y = place[:, 0] - window[4], place[:, 1] - window[5]
-        seen_x, seen_y = window[6] * x - window[7] * y, window[7] * x + window[6] * y
-        inside = (seen_x >= window[0] - slack) & (seen_x <= window[2] + slack)
-        inside &= (seen_y >= window[1] - slack) & (seen_y <= window[3] + slack)
-        if not inside.all():
-            return False
-    return True
-
-
-def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:
-    """Trims, as the lattice numbers them, cut into pieces of about equal length."""
-    longest = float(word.durations.sum()) / MOST_PIECES
-    counts = np.maximum(1, np.ceil(word.durations / longest).astype(int))
-    numbers = query.library.number_of[word.trims]
-    return np.repeat(numbers, counts), np.repeat(word.durations / counts, counts)
+    slack = np.tile(window[8] - bulge, 2)
+    x, y = (np.concatenate([before.pose, after.pose])[:, :2] - window[4:6]).T
+    seen_x, seen_y = window[6] * x - window[7] * y, window[7] * x + window[6] * y
+    inside = (seen_x >= window[0] - slack) & (seen_x <= window[2] + slack)
+    inside &= (seen_y >= window[1] - slack) & (seen_y <= window[3] + slack)
+    return bool(inside.all())
 
 
 def _with_rests(path: PathArrays, state: int, rest: int) -> list[tuple[int, float]]:
@@ -161,8 +151,7 @@ def _with_rests(path: PathArrays, state: int, rest: int) -> list[tuple[int, floa
     while (parent := int(path.links[state, kernels.PARENT])) >= 0:
         joint = int(path.links[parent, kernels.JOINT])
         parts.append((int(path.trims[joint]), float(path.durations[joint])))
-        left = float(path.times[state, kernels.DEPARTURE])
-        waited = left - float(path.times[parent, kernels.ARRIVAL])
+        waited = float(path.times[state, kernels.DEPARTURE] - path.times[parent, kernels.ARRIVAL])
         if waited > 0.0:
             parts.append((rest, waited))
         state = parent
