@@ -57,6 +57,11 @@ def write_text_atomically(path: Path, text: str) -> None:
     write_bytes_atomically(path, text.encode("utf-8"))
 
 
+def stem_of(path: Path) -> str:
+    """The name of a file without its ending; bytes that are not UTF-8 are spelled out."""
+    return path.stem.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def journal_lines(path: Path) -> list[str]:
     """The whole lines of a journal, without one that a kill cut off; none if it is not there."""
     text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+from maneuver_automaton._files import stem_of, write_bytes_atomically, write_text_atomically
 
 
 def test_makes_folders_and_replaces(tmp_path):
@@ -34,3 +36,7 @@ def test_a_link_stays_a_link(tmp_path):
     write_text_atomically(link, "new")
     assert link.is_symlink()
     assert path.read_text() == "new"
+
+
+def test_a_name_that_is_not_utf_8_is_spelled_out():
+    assert stem_of(Path("folder/x\udcff.yaml")) == "x\\udcff"

@@ -22,6 +22,8 @@ from maneuver_automaton.problem import Problem, between_trims
 from maneuver_automaton.search import beginning, lattice_query
 from maneuver_automaton.search.choose import load_search
 
+MOST_ALTERNATIVES = 1 << 16  # that are looked for, however many are asked for
+
 
 def plan(
     problem: Problem,
@@ -122,7 +124,7 @@ def plan_in(
 ) -> PlanResult:
     """Plan as `plan` does, with arrays prepared for the problem's map."""
     time_limit = as_number("time_limit", time_limit)
-    alternatives = as_whole("alternatives", alternatives)
+    alternatives = min(as_whole("alternatives", alternatives), MOST_ALTERNATIVES)
     gap = None if gap is None else as_number("gap", gap)
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")

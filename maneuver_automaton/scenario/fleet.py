@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 from pydantic import Field
 
 from maneuver_automaton._brief import brief
+from maneuver_automaton._files import stem_of
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.fleet import FleetProblem
 from maneuver_automaton.formats.documents import errors_at
@@ -272,7 +273,7 @@ def fleet_of_document(
     }
     _check_loop(document, file, fleet)
     return FleetScenario(
-        name=(path.stem if path else document.name) if file.name is None else file.name,
+        name=(stem_of(path) if path else document.name) if file.name is None else file.name,
         fleet=fleet,
         vehicles=tuple(replace(one, name=name) for one, name in zip(alone, names, strict=True)),
         settings=file.fleet,

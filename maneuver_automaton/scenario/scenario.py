@@ -14,6 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
+from maneuver_automaton._files import stem_of
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import InvalidScenario
@@ -218,7 +219,7 @@ def scenario_of_document(
             **bodies,
         )
     return Scenario(
-        name=(path.stem if path else document.name) if file.name is None else file.name,
+        name=(stem_of(path) if path else document.name) if file.name is None else file.name,
         problem=problem,
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
