@@ -26,6 +26,7 @@ from maneuver_automaton.formats.registry import (
 )
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
+from maneuver_automaton.recording.values import shown
 
 JOURNAL = ".journal"  # in the folder of the results, until all is done
 FINISHED = ("plan.json", "closed_loop.json", "statistics.json")
@@ -140,9 +141,6 @@ def _kept(out: Path, keys: dict[Path, str]) -> dict[Path, Row]:
 
 
 def _print_rows(rows: Sequence[Row]) -> None:
-    def shown(value: float | None, digits: int) -> str:
-        return "" if value is None else f"{value:.{digits}g}"
-
     cells = [
         [
             row.name,

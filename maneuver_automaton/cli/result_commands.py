@@ -14,7 +14,7 @@ from maneuver_automaton.cli.inputs import Parts, make_folder, naming, opened, us
 from maneuver_automaton.cli.pictures import LookOptions, ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.exports.geojson import degrees_of
+from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.formats.closed_loop_json import driven_document
 from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.plan_json import plan_of_document

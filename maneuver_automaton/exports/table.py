@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
-from maneuver_automaton.exports.geojson import degrees_of
+from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
 
@@ -127,14 +127,12 @@ def _curvature(rows: PlanArrays, rates: Array, model: Model | None) -> Array:
         else:
             bend = turn / ahead
     stands = speed < AT_REST
-    # At rest that at which it would set off: of turn rate to speed, as both rise.
     bend, n_z = np.where(stands, 0.0, bend), rows.reduced_state.shape[1]
-    for along in np.eye(n_z + rows.control.shape[1]):
-        if model is None:
-            break
-        change = _derivative(model, rows.reduced_state, rows.control, along[:n_z], along[n_z:])
-        moves = stands & (change[:, 0] != 0.0)
-        bend[moves] = change[moves, 2] / change[moves, 0]
+    if model is not None:  # at rest it is that with which the vehicle would set off
+        for along in np.eye(n_z + rows.control.shape[1]):
+            change = _derivative(model, rows.reduced_state, rows.control, along[:n_z], along[n_z:])
+            moves = stands & (change[:, 0] != 0.0)
+            bend[moves] = change[moves, 2] / change[moves, 0]  # of turn rate to speed, as both rise
     return np.where(stands & (np.abs(turn) >= AT_REST), np.nan, bend)
 
 

@@ -12,7 +12,8 @@ from pydantic import Field
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.exports.geojson import feature_of, geometry_of, metres_of, save_features
+from maneuver_automaton.exports.earth import metres_of
+from maneuver_automaton.exports.geojson import feature_of, geometry_of, save_features
 from maneuver_automaton.field.covering import FieldProblem, FieldResult
 from maneuver_automaton.formats.statement import simple_polygon
 from maneuver_automaton.formats.text_source import read_text

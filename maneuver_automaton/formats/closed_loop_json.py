@@ -241,6 +241,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     if document.get("automaton_hash") != automaton_hash(automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
     _check_rows(document["steps"], automaton, path)
+    poses = np.array([row["vehicle_pose"] for row in document["steps"]], dtype=np.float64)
     with errors_at(path):
         steps = []
         for row in document["steps"][:-1]:
@@ -249,9 +250,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
             value = float(row["value"])  # of what is driven it is known
             one = made(Step, row, AppliedEntry, plan=plan, decision=decision, value=value)
             steps.append(one)
-    return tuple(steps), np.array(
-        [row["vehicle_pose"] for row in document["steps"]], dtype=np.float64
-    )
+    return tuple(steps), poses
 
 
 def _check_rows(rows: list[dict[str, Any]], automaton: Automaton, path: Path | str) -> None:

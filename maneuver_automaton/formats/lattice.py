@@ -229,9 +229,9 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
             f"turning_radius: {turning_radius:g} m are {radius:.6g} cells of {resolution:g} m, "
             f"need at most {MOST_CELLS}"
         )
-    turned = np.array([[0, 1], [-1, 0]])  # cells (16, 2), counter-clockwise from the x axis
+    turned = np.array([[0, 1], [-1, 0]])
     quarters = [np.array(QUARTER) @ np.linalg.matrix_power(turned, k) for k in range(4)]
-    directions = np.concatenate(quarters)
+    directions = np.concatenate(quarters)  # cells (16, 2), counter-clockwise from the x axis
     headings = np.mod(np.arctan2(directions[:, 1], directions[:, 0]), 2.0 * math.pi)
     n = len(headings)
     steps = [k for k in range(-MOST_TURNED, MOST_TURNED + 1) if k]

@@ -60,6 +60,14 @@ STATUS = {
 }
 
 
+def answered(solver: Any, answer: Any) -> tuple[Array, SolveStatus, str, int]:
+    """Values of all variables, the status, the solver's own word for it, and iterations."""
+    stats = solver.stats()
+    reason = str(stats["return_status"])
+    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    return values, STATUS.get(reason, SolveStatus.FAILED), reason, int(stats["iter_count"])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolverSettings:
     """When the solver stops, how it begins, and what is believed of its answer."""

@@ -20,9 +20,9 @@ from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import problem as programs
 from maneuver_automaton.optimal_control import transcription
 from maneuver_automaton.optimal_control.ipopt import (
-    STATUS,
     SolverSettings,
     SolveStatus,
+    answered,
     ipopt_options,
     load_casadi,
     numpy_on_symbols,
@@ -161,19 +161,8 @@ def transfer_program(
     if not n_z:
         raise ValueError(f"{model.name}: has no reduced state, so its trims need no maneuvers")
     n_u, n_stages, steps = len(model.control_names), settings.intervals, settings.steps
-    problem = programs.OptimalControlProblem(
-        state_names=model.reduced_names,
-        control_names=model.control_names,
-        dynamics=model.dynamics,
-        start=(None,) * n_z,
-        end=(None,) * n_z,
-        duration=settings.duration,
-        stage_cost=lambda z, u: (
-            objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
-        ),
-    )
     grid = programs.TimeGrid(n_nodes=steps + 1, rule="rk4", held=steps)
-    one = transcription.transcribe(problem, grid)
+    one = transcription.transcribe(_of_one_interval(model, objective, settings), grid)
 
     def too_fast(states: Any, control: Any) -> Any:  # rows that must not be positive
         if not math.isfinite(lateral_limit(model)):
@@ -222,6 +211,24 @@ def transfer_program(
         equality=tuple(equality),
         solver=casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver)),
         build_s=time.perf_counter() - began,
+    )
+
+
+def _of_one_interval(
+    model: Model, objective: ManeuverObjective, settings: TransferSettings
+) -> programs.OptimalControlProblem:
+    """The effort of the reduced state alone, from any one to any other."""
+    free, scale = (None,) * len(model.reduced_names), programs.control_scale(model)
+    return programs.OptimalControlProblem(
+        state_names=model.reduced_names,
+        control_names=model.control_names,
+        dynamics=model.dynamics,
+        start=free,
+        end=free,
+        duration=settings.duration,
+        stage_cost=lambda z, u: (
+            objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
+        ),
     )
 
 
@@ -300,21 +307,19 @@ def solve_transfer(
         lbg=np.where(program.equality, 0.0, -np.inf),
         ubg=0.0,
     )
-    stats = program.solver.stats()
     solve_s = time.perf_counter() - began
-    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    values, status, reason, iterations = answered(program.solver, answer)
     stages = values[: count * program.width].reshape(count, -1)
     begins = stages[:, : n_z + 1 + n_u]
     nodes = np.hstack([begins[:, :n_z], stages[:, n_z + 1 + n_u : -n_u]]).reshape(-1, n_z)
-    reason = str(stats["return_status"])
     return Transfer(
-        status=STATUS.get(reason, SolveStatus.FAILED),
+        status=status,
         reason=reason,
         duration=float(begins[0, n_z]),
         control=stages[:, -n_u:],
         reduced_state=np.vstack([nodes, values[count * program.width :][:n_z]]),
         cost=float(answer["f"]),
-        iterations=int(stats["iter_count"]),
+        iterations=iterations,
         solve_s=solve_s,
     )
 

@@ -24,9 +24,9 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, assembled, kind_of
 from maneuver_automaton.optimal_control.ipopt import (
     QUIET,
-    STATUS,
     SolveStatus,
     Watcher,
+    answered,
     load_casadi,
     numpy_on_symbols,
     watcher_of,
@@ -334,10 +334,7 @@ def solve_from(
         ubg=solver.limits[:, 1],
         **({"lam_x0": known.bounds, "lam_g0": known.rows} if known and begin is Begin.SAME else {}),
     )
-    stats = function.stats()
-    reason = str(stats["return_status"])
-    status = STATUS.get(reason, SolveStatus.FAILED)
-    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    values, status, reason, iterations = answered(function, answer)
     objective, is_solved = float(answer["f"]), status is SolveStatus.SOLVED
     if not is_solved and watcher.best is not None:
         values, objective = watcher.best, watcher.least
@@ -354,7 +351,7 @@ def solve_from(
             status=status,
             reason=reason,
             objective=objective,
-            iterations=int(stats["iter_count"]),
+            iterations=iterations,
             seconds=watcher.budget.elapsed - began,
             is_feasible=is_solved or watcher.best is not None,
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +12,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.optimal_control.ipopt import (
-    STATUS,
     SolverSettings,
     SolveStatus,
+    answered,
     ipopt_options,
     load_casadi,
     numpy_on_symbols,
@@ -270,12 +270,10 @@ def solve(
         lbg=program.limits[:, 0],
         ubg=program.limits[:, 1],
     )
-    solved, stats = time.perf_counter(), solver.stats()
-    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    solved = time.perf_counter()
+    values, status, reason, iterations = answered(solver, answer)
     state, control, duration = unpacked(problem, grid, values)
     checked = evaluate(problem, grid, state=state, control=control, duration=duration)
-    reason = str(stats["return_status"])
-    status = STATUS.get(reason, SolveStatus.FAILED)
     worst = max(checked.worst_defect, checked.worst_violation)
     if status is SolveStatus.SOLVED and not worst <= settings.admitted_defect:
         status = SolveStatus.FAILED
@@ -291,7 +289,7 @@ def solve(
         control=control,
         cost=checked.cost,
         integrals=checked.integrals,
-        iterations=int(stats["iter_count"]),
+        iterations=iterations,
         build_s=built - began,
         solve_s=solved - built,
         worst_defect=checked.worst_defect,
@@ -322,11 +320,10 @@ def bounds_of(problem: OptimalControlProblem, grid: TimeGrid) -> Array:
 
 
 def _check_guess(problem: OptimalControlProblem, guess: Guess) -> None:
-    widths: Sequence[tuple[str, Array, tuple[str, ...]]] = (
+    for what, rows, names in (
         ("state", guess.state, problem.state_names),
         ("control", guess.control, problem.control_names),
-    )
-    for what, rows, names in widths:
+    ):
         if rows.shape[1] != len(names):
             raise ValueError(
                 f"guess: {what} has {rows.shape[1]} columns, need {len(names)} ({', '.join(names)})"

@@ -183,7 +183,7 @@ class Maneuver:
             )
 
     def known_course(self, otherwise: str) -> Trajectory:
-        """The course; raises a ValueError that says what comes of it that there is none."""
+        """The course; a ValueError that ends with `otherwise` if there is none."""
         if self.course is None:
             raise ValueError(f"maneuver {self.name!r}: has no course, {otherwise}")
         return self.course

@@ -12,7 +12,7 @@ from shapely.geometry import shape
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli.app import run
-from maneuver_automaton.exports.geojson import degrees_of, metres_of
+from maneuver_automaton.exports.earth import degrees_of, metres_of
 from maneuver_automaton.field.files import load_field
 from tests.field.cases import OBLONG
 
