@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import wrapped
-from maneuver_automaton._compile import plain
+from maneuver_automaton._compile import called_again, plain
 from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
@@ -57,6 +57,7 @@ class Pass:
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
     begun_with: int = 0  # expansions that were done before it was asked to run
+    expand: Callable[[LatticeSearch, int, float], int] = kernels.expand
 
     @property
     def arrays(self) -> SearchArrays:
@@ -123,7 +124,8 @@ class Pass:
                 if self.is_late:
                     break
                 self.search = self.search._replace(arrays=with_room(self.arrays, most))
-                self.alive = bool(kernels.expand(self.search, step, upper_bound))
+                self.alive = bool(self.expand(self.search, step, upper_bound))
+                self.expand = called_again(kernels.expand)
                 found = self.search.task.stop_at_first and self.arrays.state[layout.FOUND]
                 if self.expansions >= until or found:
                     break
