@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 
 from maneuver_automaton._cache_files import PLAINLY, say_once
 from maneuver_automaton._interrupts import compiler_works
-from maneuver_automaton._kernel_files import kinds_of, loaded
+from maneuver_automaton._kernel_files import kinds_of, loaded, types_of
 from maneuver_automaton._kernel_folders import kernel_folder
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
@@ -32,6 +32,7 @@ class CompiledLater:
         self._function = function
         self._make = make
         self.loaded: dict[str, Callable[..., Any]] = {}  # without numba, by kinds of arguments
+        self._entries: dict[tuple[Any, ...], Callable[..., Any]] = {}  # the same by their types
         self._run: Callable[..., Any] = self._run_without_numba
 
     @functools.cached_property
@@ -58,11 +59,16 @@ class CompiledLater:
         """What was compiled for arguments of these types, without numba; None: ask numba."""
         if "numba" in sys.modules:
             return None
+        types = types_of(args)
+        if entry := self._entries.get(types):
+            return entry
         try:
             kinds = kinds_of(args)
         except (AttributeError, KeyError):  # what only numba can type
             return None
-        return self.loaded.get(kinds) or self.load(kinds)
+        if entry := self.loaded.get(kinds) or self.load(kinds):
+            self._entries[types] = entry
+        return entry
 
     def _run_without_numba(self, *args: Any) -> Any:
         return (self.load_for(args) or self.compiled)(*args)
@@ -120,9 +126,10 @@ def bare_inner_kernel(function: Kernel) -> Kernel:
 def shared_kernel(function: Kernel) -> Kernel:
     """An `inner_kernel` that is compiled once, and called where it lies by those that call it.
 
-    For what many kernels need, and what takes long enough that a call counts for nothing.
+    For what many kernels need, and what takes long enough that a call counts for nothing. It may
+    make arrays, whoever calls it.
     """
-    return _later(function, _shared, {})
+    return _later(function, _shared, {"_nrt": True})
 
 
 def bare_shared_kernel(function: Kernel) -> Kernel:

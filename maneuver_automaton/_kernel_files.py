@@ -97,6 +97,20 @@ def kinds_of(args: Iterable[Any]) -> str:
     return ",".join(kinds)
 
 
+def types_of(args: Iterable[Any]) -> tuple[Any, ...]:
+    """What `kinds_of` tells apart, as values that are found in half the time."""
+    found: list[Any] = []
+    for one in args:
+        kind = type(one)
+        if kind is np.ndarray:
+            found += (one.dtype, one.ndim, one.flags.num)
+        elif kind in SCALARS or not isinstance(one, tuple):
+            found.append(kind)
+        else:
+            found += (kind, types_of(one))
+    return tuple(found)
+
+
 @functools.cache
 def _array_kind(dtype: np.dtype[Any], axes: int, flags: int) -> str:
     if not (NUMBERS.fullmatch(dtype.name) and dtype.isnative and flags & 0x100):  # aligned

@@ -7,6 +7,7 @@ import numpy as np
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision._kernels_field import write_all
 from maneuver_automaton.collision._kernels_moving import coast_of
 from maneuver_automaton.collision.body import fastest_points
 from maneuver_automaton.collision.world import World, own_frame, world_of
@@ -28,6 +29,12 @@ def world_around(footprint, obstacles, *, keep: float = 0.0, present=None) -> Wo
     listed = tuple(obstacles)
     frame = own_frame(listed, np.zeros(3))
     return world_of(listed, tuple(footprint), frame, keep=keep, present=present)
+
+
+def distances_of(field) -> np.ndarray:
+    """All distances (rows, columns) of a field, which else are written where they are asked for."""
+    write_all(field)
+    return field.distance
 
 
 def driven(pose, twist, times) -> np.ndarray:

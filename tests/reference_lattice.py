@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from maneuver_automaton._arrays import Array
 from tests.reference import plain_end
+from tests.reference_collision import distances_of
 
 
 def centre_clearances(grid, field) -> Array:
@@ -21,7 +22,7 @@ def centre_clearances(grid, field) -> Array:
     in_j = (f_j >= 0) & (f_j < field.distance.shape[0])
     in_i = (f_i >= 0) & (f_i < field.distance.shape[1])
     clear = np.full((grid.layout.rows, grid.layout.columns), np.inf)
-    clear[np.ix_(in_j, in_i)] = field.distance[np.ix_(f_j[in_j], f_i[in_i])]
+    clear[np.ix_(in_j, in_i)] = distances_of(field)[np.ix_(f_j[in_j], f_i[in_i])]
     return clear
 
 

@@ -161,7 +161,7 @@ VALUES = [
 
 
 def test_kinds_of_arguments_are_told_as_finely_as_numba_tells_types():
-    known: dict[str, Any] = {}
+    known: dict[Any, Any] = {}
     for value in VALUES:
         try:
             kinds = _kernel_files.kinds_of((value,))
@@ -170,7 +170,8 @@ def test_kinds_of_arguments_are_told_as_finely_as_numba_tells_types():
         kind = numba.typeof(value)
         assert kinds == _kernel_cache._kinds_of((kind,)), value
         assert known.setdefault(kinds, kind) == kind
-    assert len(known) == 25
+        assert known.setdefault(_kernel_files.types_of((value,)), kinds) == kinds
+    assert sum(isinstance(one, str) for one in known) == 25
 
 
 def test_records_are_told_apart_by_their_fields():
@@ -180,6 +181,7 @@ def test_records_are_told_apart_by_their_fields():
 
     Other.__module__, Other.__qualname__ = Two.__module__, Two.__qualname__
     assert _kernel_files.kinds_of((Two(1, 2),)) != _kernel_files.kinds_of((Other(1, 2),))
+    assert _kernel_files.types_of((Two(1, 2),)) != _kernel_files.types_of((Other(1, 2),))
 
 
 PLAN = """

@@ -117,7 +117,7 @@ def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_n
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_kernels_are_compiled_by_several_processes():
-    names = ("collision._kernels_field.count_buckets", "collision._kernels_field.fill_buckets")
+    names = ("collision._kernels_field.write_map", "collision._kernels_field.fill_buckets")
     few = [f"maneuver_automaton.{name}" for name in names]
     seen = []
     failed = _compile_all.compile_kernels(few, jobs=2, report=lambda *both: seen.append(both))

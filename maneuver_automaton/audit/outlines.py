@@ -94,19 +94,20 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
     maps = [(k, one) for k, one in enumerate(solids) if isinstance(one, OccupancyMap)]
     if boxes:
         numbers = np.array([k for k, _ in boxes])
-        seen = np.zeros((numbers.size, 4, 3))
-        seen[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
-        seen[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
-        frames = np.zeros((numbers.size, 3))
-        frames[:, :2] = np.array([one.center for _, one in boxes]) - origins[numbers]
-        frames[:, 2] = [one.heading for _, one in boxes]
-        corners = points_of(placed(frames[:, None], seen))
+        centers = np.concatenate([one.center for _, one in boxes]).reshape(-1, 2) - origins[numbers]
+        sizes = np.concatenate([one.size for _, one in boxes]).reshape(-1, 2, 1)
+        heading = np.array([one.heading for _, one in boxes])[:, None]
+        x, y = sizes[:, 0] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1] * [-0.5, -0.5, 0.5, 0.5]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        corners = np.empty(x.shape, dtype=np.complex128)
+        corners.real = centers[:, :1] + (cosine * x - sine * y)
+        corners.imag = centers[:, 1:] + (sine * x + cosine * y)
         both = corners.ravel(), corners[:, [1, 2, 3, 0]].ravel()
         found.append((numbers.repeat(4), *both, np.zeros(corners.size)))
     if discs:
         numbers = np.array([k for k, _ in discs])
-        centers = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
-        found.append((numbers, centers, centers, np.array([one.radius for _, one in discs])))
+        points = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
+        found.append((numbers, points, points, np.array([one.radius for _, one in discs])))
     if polygons:
         rings = [(k, [one.corners - origins[k]]) for k, one in polygons if one.is_plain]
         others = [(k, one) for k, one in polygons if not one.is_plain]
@@ -299,34 +300,32 @@ def surroundings_around(
     ValueError
         If a polygon has no area.
     """
-    motions: list[Motion] = []
-    present: list[tuple[float, float]] = []
+    moving = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is not None]
+    movers: list[Any] = [obstacles[k] for k in moving]
+    given = [one.motion for one in movers]
+    motions = [Motion(one.time, one.pose - [*origin, 0.0], one.twist) for one in given]
     heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
-    number = np.full(len(obstacles), -1)
     for k, one in enumerate(obstacles):
         if isinstance(one, Obstacle) and one.height is not None:
             heights[k] = one.height
-        if isinstance(one, Obstacle) and one.motion is not None:
-            number[k] = len(motions)
-            motion = one.motion
-            motions.append(Motion(motion.time, motion.pose - [*origin, 0.0], motion.twist))
-            present.append(one.presence)
+    number = np.full(len(obstacles), -1)
+    number[moving] = np.arange(len(moving))
     solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
     whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights[owners]
-    still, moving = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
+    still, edges = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
     knots = Knots.of(motions) if motions else NO_KNOTS
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == k) for k in range(len(motions)))
-    movers = MovingEdges(
+    moved = MovingEdges(
         motions=tuple(motions),
         knots=knots,
-        present=np.array(present, dtype=np.float64).reshape(-1, 2),
+        present=np.array([one.presence for one in movers], dtype=np.float64).reshape(-1, 2),
         fastest=fastest,
         speeds=np.where(knots.arcs, fastest, 0.0),
         bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
-        edges=moving,
-        firsts=np.searchsorted(index[moving], np.arange(len(motions) + 1)),
+        edges=edges,
+        firsts=np.searchsorted(index[edges], np.arange(len(motions) + 1)),
         groups=groups,
         reaches=np.array([float((np.abs(one.begins) + one.radius).max()) for one in groups]),
     )
@@ -335,7 +334,7 @@ def surroundings_around(
         owners=owners,
         heights=heights_of,
         motion_of_edge=index,
-        movers=movers,
+        movers=moved,
         still=still,
         index=_boxed(whole, still, heights_of),
         rounds=bool(whole.radius.any()),

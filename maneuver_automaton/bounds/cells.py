@@ -13,7 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_boxes, _kernels_certificate
 from maneuver_automaton.bounds.arrays import PoseArrays
 from maneuver_automaton.collision import AnyObstacle
-from maneuver_automaton.collision.convex import Solids, solids_of
+from maneuver_automaton.collision.convex import Solids, pieces_of, solids_of
 from maneuver_automaton.collision.layers import always
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.problem import Bounds, Goal, Problem, moves
@@ -122,7 +122,7 @@ def _inside(edges: Array, first: IntArray, rounding: Array) -> tuple[Solids, Arr
         ring, lack = _cut(edges[first[k] : first[k + 1]], radius)
         rings.append((ring, 0.0))
         lacks.append(lack)
-    return solids_of(rings), np.array(lacks, dtype=np.float64)
+    return solids_of(pieces_of(rings)), np.array(lacks, dtype=np.float64)
 
 
 def _cut(edges: Array, radius: float) -> tuple[Array, float]:

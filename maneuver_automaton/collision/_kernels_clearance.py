@@ -14,6 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton.collision._kernels_field import known_distance
 from maneuver_automaton.collision.arrays import (
     AboutCenter,
     Buckets,
@@ -184,7 +185,7 @@ def field_at(field: Field, body: Body, d: int, place: Place) -> tuple[float, flo
     at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
     i, j = math.floor(at_x), math.floor(at_y)
     if 0 <= i < field.distance.shape[1] and 0 <= j < field.distance.shape[0]:
-        return field.distance[int(j), int(i)], at_x - i - 0.5, at_y - j - 0.5
+        return known_distance(field, int(j), int(i)), at_x - i - 0.5, at_y - j - 0.5
     return field.outside, 0.0, 0.0  # the field reaches that far beyond all solids
 
 

@@ -7,56 +7,78 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, shared_kernel
 from maneuver_automaton.collision.arrays import Buckets, Field, Place
-from maneuver_automaton.collision.convex import Solids
+
+TILE = 8  # cells along a side of what is written at once
+
+
+@shared_kernel
+def write_tile(field: Field, row: int, column: int) -> None:
+    """Write distances to the solids of a field, negative inside one, around a cell."""
+    cell, cap = field.cell, field.outside
+    edges, first, plates = field.solids.edges, field.solids.first, field.solids.plates
+    rows, columns = field.distance.shape
+    j_0, i_0 = row // TILE * TILE, column // TILE * TILE
+    n_rows, n_columns = min(TILE, rows - j_0), min(TILE, columns - i_0)
+    x, y = np.empty(TILE * TILE), np.empty(TILE * TILE)
+    for j in range(TILE):
+        for i in range(TILE):
+            x[j * TILE + i] = field.origin_x + (i_0 + i + 0.5) * cell
+            y[j * TILE + i] = field.origin_y + (j_0 + j + 0.5) * cell
+    lowest, square, left = np.full(x.size, cap), np.empty(x.size), np.empty(x.size)
+    most = cap  # of `lowest`: what is further away lowers nothing
+    for p in range(plates.shape[0]):
+        off_x = max(max(plates[p, 0] - x[-1], x[0] - plates[p, 2]), 0.0)
+        off_y = max(max(plates[p, 1] - y[-1], y[0] - plates[p, 3]), 0.0)
+        if off_x * off_x + off_y * off_y > most * most:
+            continue
+        square[:] = math.inf
+        # A line and a disc's middle have no inside.
+        left[:] = math.inf if first[p + 1] - first[p] > 2 else -1.0
+        before = first[p + 1] - 1
+        for k in range(first[p], first[p + 1]):
+            a_x, a_y = edges[before, 0], edges[before, 1]
+            e_x, e_y = edges[k, 0] - a_x, edges[k, 1] - a_y
+            length = e_x * e_x + e_y * e_y
+            length = length if length > 0.0 else math.inf  # its first end is the nearest point
+            for i in range(x.size):  # several cells at once, with a division each
+                to_x, to_y = x[i] - a_x, y[i] - a_y
+                share = min(max((to_x * e_x + to_y * e_y) / length, 0.0), 1.0)
+                off_x, off_y = to_x - share * e_x, to_y - share * e_y
+                square[i] = min(square[i], off_x * off_x + off_y * off_y)
+                left[i] = min(left[i], e_x * to_y - e_y * to_x)
+            before = k
+        most = -math.inf
+        for i in range(x.size):
+            # Rounded by its radius, a piece is nearer by as much.
+            apart = math.sqrt(square[i])
+            apart = (-apart if left[i] >= 0.0 else apart) - plates[p, 4]
+            lowest[i] = min(lowest[i], apart)
+            most = max(most, lowest[i])
+    for j in range(n_rows):
+        for i in range(n_columns):
+            field.distance[j_0 + j, i_0 + i] = lowest[j * TILE + i]
+
+
+@bare_inner_kernel
+def known_distance(field: Field, row: int, column: int) -> float:
+    """The distance in a cell, which is written when it is first asked for."""
+    if field.distance[row, column] == 0.0 and field.solids.plates.shape[0] > 0:
+        write_tile(field, row, column)
+    return field.distance[row, column]
 
 
 @kernel
-def write_pieces(field: Field, solids: Solids, n: int) -> None:
-    """Lower a field to the distances of each of the first `n` solids, negative inside a polygon."""
-    cell, cap = field.cell, field.outside
-    edges, first, plates = solids.edges, solids.first, solids.plates
+def write_all(field: Field) -> None:
+    """Write all distances of a field to its solids."""
+    if field.solids.plates.shape[0] == 0:
+        return
     rows, columns = field.distance.shape
-    xs = field.origin_x + (np.arange(columns) + 0.5) * cell
-    # Of the cells of a row: the squared distance to the nearest edge so far, and how far they are
-    # to the left of all edges. Loops over slices are compiled to several cells at once, with a
-    # division each; to skip some of them would take longer.
-    squares, lefts = np.empty(columns), np.empty(columns)
-    for p in range(n):
-        low, high, rounding = plates[p, 0], plates[p, 2], plates[p, 4]
-        j_0 = max(0, int((plates[p, 1] - cap - field.origin_y) / cell))
-        j_1 = min(rows, int((plates[p, 3] + cap - field.origin_y) / cell) + 1)
-        for j in range(j_0, j_1):
-            y = field.origin_y + (j + 0.5) * cell
-            # Nothing is lowered beyond the cap; a cell more, for rounding.
-            away = max(max(plates[p, 1] - y, y - plates[p, 3]), 0.0)
-            reach = math.sqrt(max(cap * cap - away * away, 0.0)) + cell
-            i_0 = max(0, int((low - reach - field.origin_x) / cell))
-            i_1 = max(i_0, min(columns, int((high + reach - field.origin_x) / cell) + 1))
-            x, square, left = xs[i_0:i_1], squares[i_0:i_1], lefts[i_0:i_1]
-            square[:] = math.inf
-            # A line and a disc's middle have no inside.
-            left[:] = math.inf if first[p + 1] - first[p] > 2 else -1.0
-            before = first[p + 1] - 1
-            for k in range(first[p], first[p + 1]):
-                a_x, to_y = edges[before, 0], y - edges[before, 1]
-                e_x, e_y = edges[k, 0] - a_x, edges[k, 1] - edges[before, 1]
-                length = e_x * e_x + e_y * e_y
-                length = length if length > 0.0 else math.inf  # its first end is the nearest point
-                for i in range(x.size):
-                    to_x = x[i] - a_x
-                    share = min(max((to_x * e_x + to_y * e_y) / length, 0.0), 1.0)
-                    off_x, off_y = to_x - share * e_x, to_y - share * e_y
-                    square[i] = min(square[i], off_x * off_x + off_y * off_y)
-                    left[i] = min(left[i], e_x * to_y - e_y * to_x)
-                before = k
-            row = field.distance[j, i_0:i_1]
-            for i in range(x.size):
-                # Rounded by its radius, a piece is nearer by as much.
-                apart = math.sqrt(square[i])
-                row[i] = min(row[i], (-apart if left[i] >= 0.0 else apart) - rounding)
+    for j in range(0, rows, TILE):
+        for i in range(0, columns, TILE):
+            write_tile(field, j, i)
 
 
 @inner_kernel
@@ -158,24 +180,21 @@ def cells_around(buckets: Buckets, plate: Array, around: float) -> tuple[int, in
 
 
 @kernel
-def count_buckets(buckets: Buckets, plates: Array, around: float) -> None:
-    """How many pieces are `around` each bucket, one place late: `start[k + 1]`."""
+def fill_buckets(buckets: Buckets, plates: Array, around: float) -> IntArray:
+    """The pieces that are `around` each bucket, in order; where those of each begin is written."""
     start, columns = buckets.start, buckets.columns
     for p in range(plates.shape[0]):
         i_0, i_1, j_0, j_1 = cells_around(buckets, plates[p], around)
         for j in range(j_0, j_1):
             for i in range(i_0, i_1):
                 start[j * columns + i + 1] += 1
-
-
-@kernel
-def fill_buckets(buckets: Buckets, plates: Array, around: float) -> None:
-    """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
-    start, items, columns = buckets.start, buckets.items, buckets.columns
+    start[:] = np.cumsum(start)
+    items, ends = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
     for p in range(plates.shape[0]):
         i_0, i_1, j_0, j_1 = cells_around(buckets, plates[p], around)
         for j in range(j_0, j_1):
             for i in range(i_0, i_1):
                 k = j * columns + i
-                items[start[k]] = p
-                start[k] += 1
+                items[ends[k]] = p
+                ends[k] += 1
+    return items

@@ -15,9 +15,10 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
         return layers.first
     m_0, m_1 = layers.first_moving[k], layers.first_moving[k + 1]
     sizes, counts = layers.sizes, layers.counts
-    moving = layers.moving
+    moving, solids = layers.moving, layers.solids
+    whole = Solids(solids.edges, solids.first, solids.plates[:0])
     return WorldArrays(
-        Solids(layers.solids.edges, layers.solids.first, layers.solids.plates),
+        Solids(solids.edges, solids.first, solids.plates),
         Buckets(
             layers.start[k],
             layers.items,
@@ -28,7 +29,7 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
             counts[k, 1],
             sizes[k, 3],
         ),
-        Field(layers.distance[k], sizes[k, 4], sizes[k, 5], sizes[k, 6], sizes[k, 7]),
+        Field(layers.distance[k], sizes[k, 4], sizes[k, 5], sizes[k, 6], sizes[k, 7], whole),
         MovingObstacles(
             layers.solids,
             moving.first_piece[m_0 : m_1 + 1],

@@ -43,13 +43,14 @@ class AboutCenter(NamedTuple):
 
 
 class Field(NamedTuple):
-    """Distances to the nearest solid at cell centres, capped."""
+    """Distances to the nearest solid at cell centres, capped; written where they are asked for."""
 
-    distance: Array  # (rows, columns) [m]
+    distance: Array  # (rows, columns) [m]; 0 where none is known yet
     origin_x: float
     origin_y: float
     cell: float  # [m]
     outside: float  # [m] distance that holds outside the field
+    solids: Solids  # to which distances are written; none where all are
 
 
 class Buckets(NamedTuple):

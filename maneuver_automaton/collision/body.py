@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.collision.convex import convex_pieces, solids_of
+from maneuver_automaton.collision.convex import convex_pieces, pieces_of, solids_of
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.shapes import Disc, Shape
@@ -38,7 +38,7 @@ def body_of(footprint: tuple[Shape, ...]) -> Body:
     pieces = [piece for shape in footprint for piece in convex_pieces(shape)]
     if not pieces:
         pieces = [(np.zeros((1, 2)), 0.0)]
-    solids = solids_of(pieces)
+    solids = solids_of(pieces_of(pieces))
     low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
     middle = 0.5 * (low + high)
     reach = max(float(np.hypot(*(ring - middle).T).max()) + rounding for ring, rounding in pieces)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.outline import solid_parts
-from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
+from maneuver_automaton.collision.shapes import (
+    NOWHERE,
+    AnyObstacle,
+    Box,
+    Disc,
+    Polygon,
+    Shape,
+    by_kind,
+)
 
 TINY_EDGE = 1e-6  # [m]
 MOST_MERGED = 60  # triangles that are joined to larger pieces; more stay as they are
@@ -22,11 +30,27 @@ _Ring: TypeAlias = tuple[_Corner, ...]
 
 
 class Solids(NamedTuple):
-    """Convex polygons, counter-clockwise, each rounded by a radius; one corner makes a disc."""
+    """Pieces as the kernels take them."""
 
     edges: Array  # (V, 5) a corner, the outward normal of the edge that ends there, its offset
     first: IntArray  # (P + 1,) where each piece begins among the edges
     plates: Array  # (P, 5) [low x, low y, high x, high y], rounding included, and the rounding
+
+
+class ConvexPieces(NamedTuple):
+    """Convex polygons, counter-clockwise, each rounded by a radius; one corner makes a disc."""
+
+    corners: Array  # (V, 2) [m] those of each piece, one after the other
+    counts: IntArray  # (P,) how many each has
+    radius: Array  # (P,) [m]
+
+    def each(self) -> Iterator[tuple[Array, float]]:
+        """Corners and rounding of each."""
+        rings = np.split(self.corners, np.cumsum(self.counts)[:-1])
+        return zip(rings[: self.counts.size], self.radius.tolist(), strict=True)
+
+
+NO_PIECES = ConvexPieces(NOWHERE, np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
 def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
@@ -40,24 +64,32 @@ def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
     return [(piece, 0.0) for piece in _decomposed(shape)]
 
 
-def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[list[tuple[Array, float]]]:
+def pieces_seen_from(shapes: tuple[AnyObstacle | Shape, ...], frame: Array) -> ConvexPieces:
     """Convex pieces, seen from a frame (3,), of polygons, those with holes, boxes, and discs.
 
     Places are counted from the frame before they are turned, and rounded before they are cut, so
-    that no digit is lost far away and a moved scene comes out the same.
+    that no digit is lost far away and a moved scene comes out the same. Maps are left out.
     """
-    polygons = [shape for shape in shapes if isinstance(shape, Polygon)]
-    plain = _plain_pieces([one.corners for one in polygons if not one.holes], frame)
-    pierced: list[tuple[Array, float]] = []
-    for one in polygons:
-        if one.holes:
-            holes = [seen_from(hole, frame) for hole in one.holes]
-            pierced += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
-    boxes = _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
-    discs = [shape for shape in shapes if isinstance(shape, Disc)]
-    centers = seen_from(np.array([one.center[None] for one in discs]), frame) if discs else ()
-    rounded = [(one, disc.radius) for one, disc in zip(centers, discs, strict=True)]
-    return [plain, pierced, boxes, rounded]
+    kinds = by_kind(shapes)
+    rings = [one.corners for _, one in kinds.polygons if not one.holes]
+    places = [*rings, kinds.centers, *(one.center[None] for _, one in kinds.discs)]
+    seen = seen_from(np.concatenate(places), frame)
+    begin, end = len(seen) - len(kinds.centers) - len(kinds.discs), len(seen) - len(kinds.discs)
+    found = [_plain_pieces(seen[:begin], np.array([len(ring) for ring in rings]))] if rings else []
+    for one in (one for _, one in kinds.polygons if one.holes):
+        holes = [seen_from(hole, frame) for hole in one.holes]
+        found.append(pieces_of(convex_pieces(Polygon(seen_from(one.corners, frame), holes))))
+    if kinds.boxes:
+        half, heading = 0.5 * kinds.sizes, kinds.headings - float(frame[2])
+        c, s = np.cos(heading), np.sin(heading)
+        along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
+        corners = np.array([-along - aside, along - aside, along + aside, aside - along])
+        boxes = np.round(corners.swapaxes(0, 1) + seen[begin:end, None], DIGITS).reshape(-1, 2)
+        found.append(ConvexPieces(boxes, np.full(end - begin, 4), np.zeros(end - begin)))
+    if kinds.discs:
+        radius = np.array([one.radius for _, one in kinds.discs])
+        found.append(ConvexPieces(seen[end:], np.ones(radius.size, dtype=np.int64), radius))
+    return joined(found)
 
 
 def seen_from(points: Array, frame: Array) -> Array:
@@ -67,79 +99,70 @@ def seen_from(points: Array, frame: Array) -> Array:
     return np.asarray(np.round(turned, DIGITS) + 0.0)
 
 
-def _plain_pieces(rings: list[Array], frame: Array) -> list[tuple[Array, float]]:
-    """Pieces of polygons without holes; the convex ones, most as a rule, are found all at once."""
-    if not rings:
-        return []
-    counts = np.array([len(ring) for ring in rings])
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    corners = seen_from(np.concatenate(rings), frame)
-    after = np.arange(1, len(corners) + 1)
+def _plain_pieces(corners: Array, counts: IntArray) -> ConvexPieces:
+    """Pieces of polygons without holes; the convex ones are found all at once."""
+    first, after = np.cumsum(counts) - counts, np.arange(len(corners)) + 1
     after[first + counts - 1] = first
     edge = corners[after] - corners
     following = edge[after]
     cross = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
     turn = np.arctan2(cross, np.einsum("ij,ij->i", edge, following))
-    total = np.add.reduceat(turn, first)
     left = np.minimum.reduceat(cross, first) >= 0.0
     right = np.maximum.reduceat(cross, first) <= 0.0
     apart = np.logical_and.reduceat(edge.any(axis=1), first)
-    # A ring is convex if it turns one way at all corners and once around; twice around crosses
-    # itself.
-    once = apart & (np.abs(np.abs(total) - 2.0 * math.pi) < 1.0)
+    # A ring is convex if it turns one way at all corners, once around: twice, it crosses itself.
+    once = apart & (np.abs(np.abs(np.add.reduceat(turn, first)) - 2.0 * math.pi) < 1.0)
+    if (once & left).all():
+        return ConvexPieces(corners, counts, np.zeros(counts.size))
     pieces: list[tuple[Array, float]] = []
-    for k, begin in enumerate(first):
-        ring = corners[begin : begin + counts[k]]
-        if once[k] and left[k]:
-            pieces.append((ring, 0.0))
-        elif once[k] and right[k]:
-            pieces.append((ring[::-1], 0.0))
+    for k, ring in enumerate(np.split(corners, first[1:])):
+        if once[k] and (left[k] or right[k]):
+            pieces.append((ring if left[k] else ring[::-1], 0.0))
         else:
             pieces += convex_pieces(Polygon(ring))
-    return pieces
+    return pieces_of(pieces)
 
 
-def _box_pieces(boxes: list[Box], frame: Array) -> list[tuple[Array, float]]:
-    if not boxes:
-        return []
-    center = seen_from(np.array([box.center for box in boxes]), frame)
-    half = 0.5 * np.array([box.size for box in boxes])
-    heading = np.array([box.heading for box in boxes]) - frame[2]
-    c, s = np.cos(heading), np.sin(heading)
-    along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
-    rings = np.array([-along - aside, along - aside, along + aside, aside - along]).swapaxes(0, 1)
-    return [(ring, 0.0) for ring in np.round(rings + center[:, None], DIGITS)]
+def pieces_of(each: Iterable[tuple[Array, float]]) -> ConvexPieces:
+    """Pieces from corners and rounding of each."""
+    every = list(each)
+    counts = np.array([len(ring) for ring, _ in every], dtype=np.int64)
+    radius = np.array([by for _, by in every], dtype=np.float64)
+    return ConvexPieces(np.concatenate([NOWHERE, *(ring for ring, _ in every)]), counts, radius)
 
 
-def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
+def joined(parts: Sequence[ConvexPieces]) -> ConvexPieces:
+    """All pieces, those of each part one after the other."""
+    return ConvexPieces(*map(np.concatenate, zip(NO_PIECES, *parts, strict=True)))
+
+
+def solids_of(pieces: ConvexPieces) -> Solids:
     """Arrays of pieces for the kernels."""
-    every = list(pieces)
-    rings, rounding = [ring for ring, _ in every], [by for _, by in every]
-    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    corners = np.concatenate([np.zeros((0, 2)), *rings])
-    radius = np.array(rounding, dtype=np.float64)
-    if not rings:
+    corners, counts, radius = pieces
+    first = np.zeros(counts.size + 1, dtype=np.int64)
+    np.cumsum(counts, out=first[1:])
+    if not counts.size:
         return Solids(np.zeros((0, 5)), first, np.zeros((0, 5)))
-    before = np.arange(len(corners)) - 1
-    before[first[:-1]] = first[1:] - 1
+    begins = first[:-1]
+    before = np.arange(-1, len(corners) - 1)
+    before[begins] = first[1:] - 1
     edge = corners - corners[before]
     length = np.hypot(edge[:, 0], edge[:, 1])
-    single = np.repeat(counts == 1, counts)
-    if not (length[~single] > 0.0).all():  # corners that rounding has made one
-        return solids_of(_without_repeats(ring, by) for ring, by in zip(rings, radius, strict=True))
-    normal = edge[:, ::-1] * (1.0, -1.0) / np.where(single, 1.0, length)[:, None]
-    low = np.minimum.reduceat(corners, first[:-1]) - radius[:, None]
-    high = np.maximum.reduceat(corners, first[:-1]) + radius[:, None]
+    short = length < TINY_EDGE
+    if short.any():
+        single = np.repeat(counts == 1, counts)
+        if not (length[~single] > 0.0).all():  # corners that rounding has made one
+            return solids_of(pieces_of(itertools.starmap(_without_repeats, pieces.each())))
+        length[single], short = 1.0, short & ~single
+    normal = edge[:, ::-1] * (1.0, -1.0) / length[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
-    for k in ((length < TINY_EDGE) & ~single).nonzero()[0]:  # its normal is rounded, like its ends
+    for k in np.flatnonzero(short):  # its normal is rounded, like its ends
         piece = int(np.searchsorted(first, k, side="right")) - 1
         offset[k] = (corners[first[piece] : first[piece + 1]] @ normal[k]).max()
-    return Solids(
-        edges=np.concatenate([corners, normal, offset[:, None]], axis=1),
-        first=first,
-        plates=np.concatenate([low, high, radius[:, None]], axis=1),
-    )
+    around = radius[:, None]
+    low, high = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
+    edges = np.concatenate([corners, normal, offset[:, None]], axis=1)
+    return Solids(edges, first, np.concatenate([low - around, high + around, around], axis=1))
 
 
 def _without_repeats(ring: Array, rounding: float) -> tuple[Array, float]:

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape
-from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
+from maneuver_automaton.collision.shapes import AnyObstacle, Shape, by_kind
+from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
     LEAST_TURN,
     STANDING,
@@ -278,8 +278,8 @@ class _Ground:
         if not (rows & ~laid.rows).any():
             return laid
         which = np.flatnonzero(rows)
-        found = [self.obstacles[k] for k in which.tolist()]
-        skin, of = obstacle_skin(obstacle_regions(found, excess=self.excess))
+        found = tuple(self.obstacles[k] for k in which.tolist())
+        skin, of = obstacle_skin(found, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
         self.laid = laid = _Laid(rows, static, self.numbers[which][of])
@@ -307,34 +307,27 @@ def _ground_of(
     )
 
 
-def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
+def _boxes_around(obstacles: tuple[AnyObstacle, ...]) -> Array:
     """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles."""
-    boxes = np.zeros((len(obstacles), 4))
-    rectangles, polygons = [], []
-    for k, one in enumerate(obstacles):
-        shape: Any = getattr(one, "shape", one)
-        if isinstance(shape, Box):
-            rectangles.append((k, shape))
-        elif isinstance(shape, Polygon):
-            polygons.append((k, shape))
-        elif isinstance(shape, Disc):
-            boxes[k] = *(shape.center - shape.radius), *(shape.center + shape.radius)
-        else:  # a map, wherever it is turned
-            far = np.hypot(*shape.extent)
-            boxes[k] = *(shape.origin[:2] - far), *(shape.origin[:2] + far)
-    if rectangles:
-        centers = np.concatenate([one.center for _, one in rectangles]).reshape(-1, 2)
-        sizes = np.concatenate([one.size for _, one in rectangles]).reshape(-1, 2)
-        heading = np.array([[one.heading] for _, one in rectangles])
+    boxes, kinds = np.zeros((len(obstacles), 4)), by_kind(obstacles)
+    for k, disc in kinds.discs:
+        boxes[k] = *(disc.center - disc.radius), *(disc.center + disc.radius)
+    for k, one in kinds.maps:  # wherever it is turned
+        far = np.hypot(*one.extent)
+        boxes[k] = *(one.origin[:2] - far), *(one.origin[:2] + far)
+    if kinds.boxes:
+        sizes, heading = kinds.sizes, kinds.headings[:, None]
         far = 0.5 * (np.abs(np.cos(heading)) * sizes + np.abs(np.sin(heading)) * sizes[:, ::-1])
-        boxes[[k for k, _ in rectangles]] = np.concatenate([centers - far, centers + far], axis=1)
-    if polygons:
-        sizes = np.array([len(one.corners) for _, one in polygons])
-        corners = np.concatenate([one.corners for _, one in polygons])
-        begins = np.cumsum(sizes) - sizes
-        ends = [np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)]
-        boxes[[k for k, _ in polygons]] = np.concatenate(ends, axis=1)
-        outlines_of([one for _, one in polygons if not one.is_plain])  # refuses one without area
+        ends = kinds.centers - far, kinds.centers + far
+        boxes[kinds.boxes] = np.concatenate(ends, axis=1)
+    if kinds.polygons:
+        counts = np.array([len(one.corners) for _, one in kinds.polygons])
+        corners = np.concatenate([one.corners for _, one in kinds.polygons])
+        begins = np.cumsum(counts) - counts
+        ends = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
+        boxes[[k for k, _ in kinds.polygons]] = np.concatenate(ends, axis=1)
+        # refuses one without area
+        outlines_of([one for _, one in kinds.polygons if not one.is_plain])
     return boxes
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision import _kernels_field
 from maneuver_automaton.collision.arrays import Field, MovingObstacles, WorldArrays
 from maneuver_automaton.collision.convex import Solids
 from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle
@@ -83,6 +84,7 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
     for k, one in enumerate(arrays):
         rows, columns = shapes[k]
         distance[k] = one.field.outside
+        _kernels_field.write_all(one.field)
         distance[k, :rows, :columns] = one.field.distance
         known = len(one.buckets.start)
         offset = sum(len(part) for part in items)

@@ -10,7 +10,7 @@ import math
 import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -156,22 +156,20 @@ class Box:
     @property
     def corners(self) -> Array:
         """Corners (4, 2) counter-clockwise, the first behind on the right [m]."""
-        return np.asarray(box_corners((self,))[0])
+        one = box_corners(self.center[None], np.array([self.heading]), self.size[None])
+        return np.asarray(one[0])
 
     def moved(self, by: LieGroup) -> Box:
         """The shape moved by a planar pose."""
         return Box(self.size, _acted(by, self.center), self.heading + float(planar(by).pose[2]))
 
 
-def box_corners(boxes: Sequence[Box]) -> Array:
-    """Corners (n, 4, 2) of boxes [m], as of each."""
+def box_corners(centers: Array, headings: Array, sizes: Array) -> Array:
+    """Corners (n, 4, 2) of boxes [m], as of each, from arrays of what boxes have."""
     signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    frames = np.empty((len(boxes), 1, 3))
-    frames[:, 0, :2], frames[:, 0, 2] = (
-        [one.center for one in boxes],
-        [one.heading for one in boxes],
-    )
-    return SE2(frames).act(signs * np.array([one.size for one in boxes])[:, None])
+    frames = np.empty((len(centers), 1, 3))
+    frames[:, 0, :2], frames[:, 0, 2] = centers, headings
+    return SE2(frames).act(signs * sizes[:, None])
 
 
 Shape: TypeAlias = Polygon | Disc | Box
@@ -405,6 +403,37 @@ class OccupancyMap:
 
 
 AnyObstacle: TypeAlias = Obstacle | OccupancyMap
+
+
+class ByKind(NamedTuple):
+    """Shapes by their kinds, each with its number; the boxes in arrays."""
+
+    boxes: list[int]
+    centers: Array  # (n, 2) [m] of the boxes
+    headings: Array  # (n,) [rad]
+    sizes: Array  # (n, 2) [m]
+    discs: list[tuple[int, Disc]]
+    polygons: list[tuple[int, Polygon]]
+    maps: list[tuple[int, OccupancyMap]]
+
+
+@functools.lru_cache(maxsize=32)  # FCL has them as the search does
+def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
+    """Shapes, those of obstacles, and maps by their kinds."""
+    every = [*enumerate(getattr(one, "shape", one) for one in solids)]
+    boxes = [(k, one) for k, one in every if isinstance(one, Box)]
+    return ByKind(
+        boxes=[k for k, _ in boxes],
+        centers=np.concatenate([NOWHERE.ravel(), *(one.center for _, one in boxes)]).reshape(-1, 2),
+        headings=np.array([one.heading for _, one in boxes]),
+        sizes=np.concatenate([NOWHERE.ravel(), *(one.size for _, one in boxes)]).reshape(-1, 2),
+        discs=[(k, one) for k, one in every if isinstance(one, Disc)],
+        polygons=[(k, one) for k, one in every if isinstance(one, Polygon)],
+        maps=[(k, one) for k, one in every if isinstance(one, OccupancyMap)],
+    )
+
+
+NOWHERE: Array = np.zeros((0, 2))
 
 
 def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:

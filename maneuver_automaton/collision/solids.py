@@ -23,10 +23,10 @@ from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
-    OccupancyMap,
     Polygon,
     Shape,
     box_corners,
+    by_kind,
 )
 from maneuver_automaton.groups import SE2
 
@@ -79,30 +79,30 @@ def convex_hull(points: Array) -> Array:
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Skin]:
-    """Sheet and posts of each obstacle in its own frame; a disc's stand out by `excess` [m]."""
-    shapes = [None if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
-    boxes = {k: one for k, one in enumerate(shapes) if isinstance(one, Box)}
-    polygons = {k: one for k, one in enumerate(shapes) if isinstance(one, Polygon)}
-    fours = {k: o.corners for k, o in polygons.items() if len(o.corners) == 4 and o.is_plain}
-    corners = [*(box_corners(list(boxes.values())) if boxes else ()), *fours.values()]
-    quads = (Skin(one, QUAD) for one in _on_quads(np.reshape(corners, (-1, 4, 2))))
-    found = dict(zip([*boxes, *fours], quads, strict=True))
-    others = {k: one for k, one in polygons.items() if k not in fours}
-    found.update(zip(others, _on_polygons(list(others.values())), strict=True))
-    for k, (one, shape) in enumerate(zip(obstacles, shapes, strict=True)):
-        if isinstance(one, OccupancyMap):
-            rectangles = blocked_rectangles(one.blocked).astype(np.float64)
-            rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
-            cells = _on_quads(SE2(one.origin).act(rings))
-            triangles = 6 * np.arange(len(cells))[:, None, None] + QUAD
-            found[k] = Skin(cells.reshape(-1, 3), triangles.reshape(-1, 3))
-        elif isinstance(shape, Disc):
-            ring = circumscribed(shape.center, shape.radius, excess)
-            first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
-            fan = np.stack([first, ring[1:-1], ring[2:]], axis=1)
-            found[k] = _on_triangles(fan, np.zeros(1, dtype=np.int64))
-    return [found[k] for k in range(len(shapes))]
+def obstacle_skin(obstacles: tuple[AnyObstacle, ...], *, excess: float) -> tuple[Skin, IntArray]:
+    """Sheets and posts of obstacles, discs by `excess` [m] too large, and whose triangles are."""
+    kinds = by_kind(obstacles)
+    fours = {k: o.corners for k, o in kinds.polygons if len(o.corners) == 4 and o.is_plain}
+    corners = [box_corners(kinds.centers, kinds.headings, kinds.sizes)] if kinds.boxes else []
+    corners += [one[None] for one in fours.values()]
+    parts = [_on_quads(np.concatenate(corners))] if corners else []
+    counts = [len(QUAD)] * (len(kinds.boxes) + len(fours))
+    others = {k: one for k, one in kinds.polygons if k not in fours}
+    numbers = [*kinds.boxes, *fours, *others, *(k for k, _ in (*kinds.discs, *kinds.maps))]
+    parts += _on_polygons(list(others.values()))
+    for _, disc in kinds.discs:
+        ring = circumscribed(disc.center, disc.radius, excess)
+        first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
+        fan = np.stack([first, ring[1:-1], ring[2:]], axis=1)
+        parts.append(_on_triangles(fan, np.zeros(1, dtype=np.int64)))
+    for _, one in kinds.maps:
+        rectangles = blocked_rectangles(one.blocked).astype(np.float64)
+        rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
+        parts.append(_on_quads(SE2(one.origin).act(rings)))
+    counts += [len(one.triangles) for one in parts[len(parts) - len(numbers) + len(counts) :]]
+    owners = np.repeat(numbers, counts)
+    whole, order = _together(parts), np.argsort(owners, kind="stable")
+    return Skin(whole.vertices, whole.triangles[order]), owners[order]
 
 
 def body_skin(pieces: Sequence[Array]) -> Skin:
@@ -120,26 +120,27 @@ def body_skin(pieces: Sequence[Array]) -> Skin:
     return Skin(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def obstacle_skin(regions: Sequence[Skin]) -> tuple[Skin, IntArray]:
-    """Regions as one skin, and which of them each triangle belongs to."""
-    counts = [len(region.triangles) for region in regions]
-    firsts = np.cumsum([0, *(len(region.vertices) for region in regions[:-1])])
-    triangles = np.concatenate([region.triangles for region in regions])
-    triangles += np.repeat(firsts, counts)[:, None]
-    vertices = np.concatenate([region.vertices for region in regions])
-    return Skin(vertices, triangles), np.repeat(np.arange(len(regions)), counts)
+def _together(parts: Sequence[Skin]) -> Skin:
+    """Skins as one."""
+    if len(parts) == 1:
+        return parts[0]
+    firsts = itertools.accumulate((len(one.vertices) for one in parts), initial=0)
+    vertices = np.concatenate([one.vertices for one in parts])
+    triangles = [one.triangles + n for one, n in zip(parts, firsts, strict=False)]
+    return Skin(vertices, np.concatenate(triangles))
 
 
 def _raised(places: Array, height: float) -> Array:
     return np.column_stack([places, np.full(len(places), height)])
 
 
-def _on_quads(corners: Array) -> Array:
-    """Vertices (k, 6, 3) of sheets and posts on convex quadrilaterals (k, 4, 2), for `QUAD`."""
+def _on_quads(corners: Array) -> Skin:
+    """Sheets and posts on convex quadrilaterals (k, 4, 2)."""
     vertices = np.full((len(corners), 6, 3), 0.5)
     vertices[:, :4, :2], vertices[:, 4:, :2] = corners, corners[:, :2]
     vertices[:, 4:, 2] = 1.5
-    return vertices
+    triangles = 6 * np.arange(len(corners))[:, None, None] + QUAD
+    return Skin(vertices.reshape(-1, 3), triangles.reshape(-1, 3))
 
 
 def _on_triangles(triangles: Array, posted: IntArray) -> Skin:

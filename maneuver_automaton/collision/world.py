@@ -7,10 +7,9 @@ world to the last bit (coordinates are rounded to 1e-9 m, far below every proven
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,8 +27,12 @@ from maneuver_automaton.collision.arrays import (
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
     DIGITS,
+    NO_PIECES,
+    ConvexPieces,
     Solids,
     convex_pieces,
+    joined,
+    pieces_of,
     pieces_seen_from,
     seen_from,
     solids_of,
@@ -43,6 +46,7 @@ from maneuver_automaton.collision.shapes import (
     Obstacle,
     OccupancyMap,
     Shape,
+    by_kind,
 )
 from maneuver_automaton.groups import SE2
 
@@ -150,38 +154,32 @@ def _static_arrays(
 ) -> tuple[Solids, Buckets, Field]:
     """The static obstacles around a footprint: the same beside any moving ones."""
     body, pose = body_of(footprint), np.array(frame)
-    maps = [one for one in static if isinstance(one, OccupancyMap)]
+    maps = unmoved = [one for _, one in by_kind(static).maps]
     if maps:
         place, turn = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0, 0, -pose[2]]))
         maps = [one.moved(place).moved(turn) for one in maps]
-    # On from the last ones that were begun anew, if these are the first of all.
-    last = [] if maps else _last_begun(footprint, frame, keep)
-    known = last[0] if last and static[: len(last[0].static)] == last[0].static else NOTHING_BEGUN
-    fresh = static[len(known.static) :]
-    seen = pieces_seen_from([one.shape for one in fresh if isinstance(one, Obstacle)], pose)
-    kinds = [[*old, *new] for old, new in zip(known.kinds, seen, strict=True)]
-    pieces = [*itertools.chain(*kinds)]
-    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
-    # by a transform of their cells.
-    listed = len(pieces)
-    for one in static:
-        if isinstance(one, OccupancyMap):
-            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
-    solids = solids_of(pieces)
-    field, begun = _field(solids, maps, body, keep), known.field
-    if begun[1:] == field[1:] and begun.distance.shape == field.distance.shape:
-        field.distance[:] = begun.distance
-        more = [*itertools.chain(*seen)]
-        _kernels_field.write_pieces(field, solids_of(more), len(more))
-    else:
-        _kernels_field.write_pieces(field, solids, listed)
-        last[:] = [_Begun(static, kinds, field)]
+    pieces = pieces_seen_from(static, pose)
+    apart = solids = solids_of(pieces)
+    if maps:
+        # Rectangles of maps come last: near contact they are solids as others, but the field takes
+        # maps by a transform of their cells.
+        rings = np.concatenate([_cells(one, pose) for one in unmoved])
+        solids = solids_of(joined([pieces, pieces_of((ring, 0.0) for ring in rings)]))
+    if not len(solids.plates):
+        return NOTHING_STANDS
+    low, high = solids.plates.min(axis=0).tolist(), solids.plates.max(axis=0).tolist()
+    extent = (*low[:2], *high[2:4])
+    field = _field(solids, extent, body, keep, most=MOST_MAP_CELLS if maps else MOST_FIELD_CELLS)
+    if maps:
+        field.distance[:] = field.outside
+        _kernels_field.write_all(field._replace(solids=apart))
+        field = field._replace(solids=NOTHING)
     for one in maps:
         x, y, heading = one.origin.tolist()
         there = Place(x, y, math.cos(heading), math.sin(heading))
         cells = np.broadcast_to(one.blocked, one.blocked.shape)  # read-only, wherever it is from
         _kernels_field.write_map(field, cells, one.resolution, there)
-    return solids, _buckets(solids.plates, body, keep), field
+    return solids, _buckets(solids.plates, extent, body, keep), field
 
 
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
@@ -210,12 +208,12 @@ def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
             continue
         if isinstance(obstacle.shape, Box):
             return (*obstacle.shape.center.tolist(), obstacle.shape.heading)
-        ring = obstacle.shape.corners
-        edge = np.concatenate([ring[1:], ring[:1]]) - ring
-        length = np.hypot(edge[:, 0], edge[:, 1])
-        longest = int(np.argmax(np.round(length / length.max(), 6))) if length.max() > 0.0 else -1
-        if longest >= 0:
-            return (*ring[0].tolist(), math.atan2(edge[longest, 1], edge[longest, 0]))
+        ring = obstacle.shape.corners.tolist()
+        edges = [(b[0] - a[0], b[1] - a[1]) for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]
+        lengths = [math.hypot(*edge) for edge in edges]
+        if (most := max(lengths)) > 0.0:  # rounded, so that a moved ring has the same longest edge
+            ahead, aside = edges[[round(one / most, 6) for one in lengths].index(1.0)]
+            return (*ring[0], math.atan2(aside, ahead))
     return ()
 
 
@@ -241,68 +239,44 @@ def _box(boxes: Array, moving: tuple[_Moving, ...], frame: Array) -> Array:
     return np.concatenate([low.min(axis=0), high.max(axis=0)])
 
 
-class _Begun(NamedTuple):
-    """Static obstacles and what was made of them."""
-
-    static: tuple[AnyObstacle, ...]
-    kinds: list[list[tuple[Array, float]]]  # pieces of each kind, as in `pieces_seen_from`
-    field: Field
+_Extent: TypeAlias = tuple[float, float, float, float]  # lowest x and y, highest x and y
 
 
-@functools.lru_cache(maxsize=16)
-def _last_begun(
-    footprint: tuple[Shape, ...], frame: tuple[float, ...], keep: float
-) -> list[_Begun]:
-    """Where the last ones that were begun anew are kept."""
-    return []
-
-
-def _field(solids: Solids, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
-    """A field for all solids, not yet written: polygons one by one, maps by their cells."""
-    if not len(solids.plates):
-        return Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf)
-    low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
-    width = high - low
-    most = MOST_MAP_CELLS if maps else MOST_FIELD_CELLS
+def _field(solids: Solids, extent: _Extent, body: Body, keep: float, *, most: int) -> Field:
+    """A field for solids, of at most so many cells; nothing of it is written yet."""
+    left, below, right, above = extent
+    width, height = right - left, above - below
     # Cells that are small against the body, so that the field decides most poses by itself; larger
     # ones where the map would need too many.
     scale = body.half_width or 0.25 * float(np.median(solids.plates[:, 2:4] - solids.plates[:, :2]))
-    padded = width + 2.0 * (keep + 4.0 * body.half_width)
-    area, longest = max(float(padded.prod()), 1e-12), float(padded.max())
+    pad = 2.0 * (keep + 4.0 * body.half_width)
+    area, longest = max((width + pad) * (height + pad), 1e-12), max(width, height) + pad
     cell = max(0.25 * scale, math.sqrt(area / most), longest / most)
-    # Every piece writes as far as the cap: where all is further away, a step is as long as the cap
-    # allows. The inscribed disc is told by the field, so the cap is no less.
+    # Where all is further away than the cap, a step is as long as the cap allows. The inscribed
+    # disc is told by the field, so the cap is no less.
     cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
-    columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
-    left, below = (low - cap).tolist()
-    return Field(np.full((rows, columns), cap), left, below, cell, cap)
+    columns, rows = math.ceil((width + 2.0 * cap) / cell), math.ceil((height + 2.0 * cap) / cell)
+    return Field(np.zeros((rows, columns)), left - cap, below - cap, cell, cap, solids)
 
 
-def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
+def _buckets(plates: Array, extent: _Extent, body: Body, keep: float) -> Buckets:
     reach = keep + (0.4 * body.reach if body.reach else 0.25)
-    if not len(plates):
-        empty = np.zeros(1, dtype=np.int64)
-        return Buckets(empty, empty[:0], 0.0, 0.0, 1.0, 0, 0, math.inf)
     around = body.reach + LISTED * reach
-    low, high = plates[:, :2].min(axis=0) - around, plates[:, 2:4].max(axis=0) + around
-    width = high - low
-    cell = max(0.35 * around, math.sqrt(float(width.prod()) / MOST_BUCKETS))
-    columns, rows = (int(n) for n in np.ceil(width / cell))
+    left, below, right, above = extent
+    low_x, low_y = left - around, below - around
+    width, height = right + around - low_x, above + around - low_y
+    cell = max(0.35 * around, math.sqrt(width * height / MOST_BUCKETS))
+    columns, rows = math.ceil(width / cell), math.ceil(height / cell)
     start = np.zeros(rows * columns + 1, dtype=np.int64)
-    where = (float(low[0]), float(low[1]), cell, columns, rows, reach)
-    _kernels_field.count_buckets(Buckets(start, start[:0], *where), plates, around)
-    start = np.cumsum(start)
-    items = np.empty(int(start[-1]), dtype=np.int64)
-    # A copy, as the kernel moves the starts on while it fills.
-    _kernels_field.fill_buckets(Buckets(start[:-1].copy(), items, *where), plates, around)
-    return Buckets(start, items, *where)
+    buckets = Buckets(start, start[:0], low_x, low_y, cell, columns, rows, reach)
+    return buckets._replace(items=_kernels_field.fill_buckets(buckets, plates, around))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Moving:
     """What a moving obstacle is in every world, whatever its frame and whatever is beside it."""
 
-    pieces: list[tuple[Array, float]]
+    pieces: ConvexPieces
     motion: Motion
     rate: Array  # (n, 3) twists of what coasts on arcs; else 0, as its poses tell all
     speed: float
@@ -326,8 +300,8 @@ def _moving_obstacles(
     there = SE2(np.array([-frame[0], -frame[1], 0.0])) @ SE2(poses)
     turned = SE2(np.array([0.0, 0.0, -frame[2]])) @ there
     found = MovingObstacles(
-        solids=solids_of([piece for one in every for piece in one.pieces]),
-        first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
+        solids=solids_of(joined([one.pieces for one in every])),
+        first_piece=np.cumsum([0, *(one.pieces.counts.size for one in every)], dtype=np.int64),
         first_knot=np.cumsum([0, *knots], dtype=np.int64),
         time=np.concatenate([np.zeros(0), *(one.motion.time for one in every)]),
         pose=np.asarray(np.round(turned.pose, DIGITS)),
@@ -356,7 +330,7 @@ def _moving_of(obstacle: Obstacle) -> _Moving:
     if motion.twist is not None:
         rate[:-1] = motion.twist
     return _Moving(
-        pieces=own,
+        pieces=pieces_of(own),
         motion=motion,
         rate=rate,
         speed=motion.fastest(far),
@@ -392,5 +366,10 @@ def slabs_of(moving: MovingObstacles, reach: float) -> Slabs:
     return Slabs(begin, width, leaves, 0, box)
 
 
-NOTHING_BEGUN = _Begun((), [[], [], [], []], Field(np.zeros((0, 0)), 0.0, 0.0, 0.0, 0.0))
+NONE, NOTHING = np.zeros(1, dtype=np.int64), solids_of(NO_PIECES)
+NOTHING_STANDS = (
+    NOTHING,
+    Buckets(NONE, NONE[:0], 0.0, 0.0, 1.0, 0, 0, math.inf),
+    Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf, NOTHING),
+)
 NOTHING_MOVES = _moving_obstacles((), np.zeros(3), (), 0.0)

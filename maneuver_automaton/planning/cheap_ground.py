@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision import OccupancyMap
+from maneuver_automaton.collision._kernels_field import write_all
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.problem import Problem
@@ -77,6 +78,7 @@ def _rates_ahead(query: LatticeQuery) -> Array:
         twists = query.library.arrays.library.twists
         rates += place.value[2] / np.hypot(twists[:, 0], twists[:, 1]).max()
     if field.distance.size:
+        write_all(field)
         far = np.pad(field.distance, 1, constant_values=field.outside)
         rows, columns = rates.shape[1:]
         x = place.origin_x + place.cell * np.arange(columns) - field.origin_x

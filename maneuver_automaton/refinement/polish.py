@@ -7,7 +7,6 @@ the others only those that come close to the best. Whatever is found is closed: 
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -99,7 +98,7 @@ class PolishTask:
     @property
     def scene(self) -> PolishScene:
         """Body, obstacles and bounds seen from the start."""
-        pieces = itertools.chain(*pieces_seen_from(list(self.obstacles), self.start[:3]))
+        pieces = pieces_seen_from(self.obstacles, self.start[:3]).each()
         most = lateral_limit(self.model)  # a limit of the vehicle that is none of one state alone
         everywhere = [Guard(lateral=most)] if math.isfinite(most) else []
         return PolishScene(
@@ -114,7 +113,7 @@ class PolishTask:
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
         """A guard with its solids seen from the start."""
         guard, shape = one
-        seen = itertools.chain(*pieces_seen_from([shape], self.start[:3]))
+        seen = pieces_seen_from((shape,), self.start[:3]).each()
         return guard._replace(solids=tuple((settled(corners), by) for corners, by in seen))
 
     def _movers_of(self, obstacle: Obstacle) -> Iterator[MovingSolid]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
+from maneuver_automaton.collision._kernels_field import known_distance
 from maneuver_automaton.collision.arrays import Field
 from maneuver_automaton.search.arrays import DistanceGrid
 
@@ -89,7 +90,7 @@ def centre_clearance(grid: DistanceGrid, field: Field, i: int, j: int) -> float:
         return -math.inf
     f_i, f_j = i * at.stride + at.shift_x, j * at.stride + at.shift_y
     if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
-        return field.distance[f_j, f_i]
+        return known_distance(field, f_j, f_i)
     return math.inf
 
 

@@ -57,7 +57,7 @@ class Pass:
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
     begun_with: int = 0  # expansions that were done before it was asked to run
-    expand: Callable[..., int] = kernels.expand
+    expand: Callable[[LatticeSearch, int, float], int] = kernels.expand
 
     @property
     def arrays(self) -> SearchArrays:

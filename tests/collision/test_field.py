@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 import shapely
 
+from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap
-from maneuver_automaton.collision._kernels_field import write_map
+from maneuver_automaton.collision._kernels_field import known_distance, write_map
 from maneuver_automaton.collision.arrays import Field, Place
+from maneuver_automaton.collision.convex import NO_PIECES, solids_of
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
-from tests.reference_collision import shapely_world, still, world_around
+from tests.reference_collision import distances_of, shapely_world, still, world_around
 
 
 def centres(field):
@@ -65,7 +67,7 @@ def test_the_field_is_the_distance(name, keep):
     rng = np.random.default_rng(1)
     for obstacles, world in random_worlds(2, scenes.FOOTPRINTS[name], 8, keep=keep):
         field = world.arrays.field
-        values, places = field.distance.ravel(), centres(field)
+        values, places = distances_of(field).ravel(), centres(field)
         some = rng.permutation(len(values))[:800]
         poses = out_of(world, places[some])
         exact = shapely_world((), still(obstacles)).clearance(poses)
@@ -80,7 +82,7 @@ def test_deep_inside_it_is_as_deep_as_it_is():
         depth = shapely.distance(
             solid_union(obstacles).boundary, shapely.points(out_of(world, places)[:, :2])
         )
-        values = world.arrays.field.distance.ravel()
+        values = distances_of(world.arrays.field).ravel()
         assert -values.min() > 2.8
         assert -values[values < 0.0] == pytest.approx(depth[values < 0.0], abs=1e-3)
 
@@ -94,7 +96,7 @@ def test_a_map_is_as_far_as_its_cells(yaw):
             continue
         distance = np.full((40, 50), 2.5)
         field, place = (
-            Field(distance, -3.0, -5.0, 0.2, 2.5),
+            Field(distance, -3.0, -5.0, 0.2, 2.5, solids_of(NO_PIECES)),
             Place(1.0, -2.0, math.cos(yaw), math.sin(yaw)),
         )
         write_map(field, cells.blocked, 0.3, place)
@@ -117,3 +119,28 @@ def test_a_world_of_one_needle_or_of_far_corners_has_a_small_field():
             world = world_around(footprint, obstacles)
             assert world.arrays.field.distance.size < 300_000
             assert world.arrays.buckets.start.size < 300_000
+
+
+@kernel
+def known_in(field, cells, out):
+    """`known_distance`, which only kernels call, in cells (n, 2)."""
+    for k in range(cells.shape[0]):
+        out[k] = known_distance(field, cells[k, 0], cells[k, 1])
+
+
+@pytest.mark.parametrize("name", ["car", "disc"])
+def test_a_cell_is_as_far_whichever_is_asked_for_first(name):
+    rng = np.random.default_rng(7)
+    for _, world in random_worlds(8, scenes.FOOTPRINTS[name], 6):
+        field = world.arrays.field
+        rows, columns = field.distance.shape
+        cells = np.stack([rng.integers(0, rows, 40), rng.integers(0, columns, 40)], axis=1)
+        anew = field._replace(distance=np.zeros_like(field.distance))
+        if not len(field.solids.plates):  # a map: all is written at once
+            continue
+        some, others = np.zeros(40), np.zeros(40)
+        known_in(anew, cells, some)
+        assert not anew.distance.all()
+        known_in(anew._replace(distance=np.zeros_like(field.distance)), cells[::-1].copy(), others)
+        assert some.tolist() == others[::-1].tolist()
+        assert some.tolist() == distances_of(anew)[*cells.T].tolist()

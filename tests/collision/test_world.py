@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision import world as worlds
 from maneuver_automaton.collision._kernels_moving import obstacle_pose
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.quickly import draws
-from tests.reference_collision import moved, world_around
+from tests.reference_collision import distances_of, moved, world_around
 
 BODY = (Box([1.0, 0.5]),)
 
@@ -48,7 +47,7 @@ def shape_on_a_raster(seed):
 def arrays_of(world):
     parts = world.arrays
     moving = parts.moving
-    return [parts.solids.edges, parts.solids.plates, parts.field.distance, parts.buckets.items,
+    return [parts.solids.edges, parts.solids.plates, distances_of(parts.field), parts.buckets.items,
             moving.time, moving.pose, moving.speed, world.box]  # fmt: skip
 
 
@@ -134,21 +133,3 @@ def test_a_small_robot_that_keeps_far_away_needs_no_large_field():
     # 2 cm wide, 2 m to be kept: cells of 2.5 mm, and 2 m of them all around
     world = world_around((Disc(0.01),), [Obstacle(Box([1.0, 1.0]))], keep=2.0)
     assert world.arrays.field.distance.size <= 500_000
-
-
-@given(seeds=st.lists(st.integers(0, 10**6), min_size=2, max_size=6), more=st.integers(1, 5))
-@settings(max_examples=draws(40))
-def test_a_field_that_goes_on_from_the_last_one_is_that_written_at_once(seeds, more):
-    """Bodies between obstacles, so that the field is as large with them."""
-    corners = [Obstacle(Disc(0.5, [x, y])) for x in (-9.0, 9.0) for y in (-9.0, 9.0)]
-    others = [shape_on_a_raster(seed) for seed in seeds]
-    last = [one for one in others if isinstance(one, Obstacle)][-more:]
-    fields = []
-    for before in (corners, [*corners, *last]):
-        worlds._last_begun.cache_clear()
-        worlds._static_arrays.cache_clear()
-        for obstacles in (before, [*corners, *last]):
-            worlds._static_arrays(tuple(obstacles), BODY, (0.0, 0.0, 0.0), 0.0)
-        fields.append(worlds._static_arrays((*corners, *last), BODY, (0.0, 0.0, 0.0), 0.0)[2])
-    assert np.array_equal(fields[0].distance, fields[1].distance)
-    assert fields[0][1:] == fields[1][1:]
