@@ -89,16 +89,7 @@ class CompiledLater:
 
 
 def kernel(function: Kernel) -> Kernel:
-    """Compile `function` with numba: without the GIL, cached on disk, IEEE division.
-
-    Examples
-    --------
-    >>> @kernel
-    ... def double(x):
-    ...     return 2.0 * x
-    >>> double(1.5)
-    3.0
-    """
+    """Compile `function` with numba: without the GIL, cached on disk, IEEE division."""
     return _later(function, _cached, {})
 
 
@@ -147,16 +138,7 @@ def by_value(record: Record) -> Record:
 
 
 def plain(function: Kernel) -> Kernel:
-    """A kernel as Python has it, for callers of a formula that kernels need as well.
-
-    Examples
-    --------
-    >>> @bare_inner_kernel
-    ... def double(x):
-    ...     return 2.0 * x
-    >>> plain(double)(1.5)
-    3.0
-    """
+    """A kernel as Python has it, for callers of a formula that kernels need as well."""
     return cast("Kernel", getattr(function, "__wrapped__", function))
 
 

@@ -310,7 +310,10 @@ def squared(tried):
 
 @kernel
 def square(tried):
-    return squared(tried)
+    sums = np.zeros(2)
+    for _ in range(3):
+        sums = sums + squared(tried)
+    return sums[1] / 3.0
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.collision._kernels_slabs import (
     apart_during,
@@ -149,7 +149,7 @@ def moving_clearance(
     return best
 
 
-@bare_inner_kernel
+@bare_shared_kernel
 def free_of_moving(
     moving: MovingObstacles, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float, int]:

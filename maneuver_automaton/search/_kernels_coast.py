@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_static, free_time
 from maneuver_automaton.collision._kernels_clearance import surely_hits
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
@@ -185,7 +185,7 @@ def swept_end(
     return Place(end[0], end[1], c * turn_c - s * turn_s, s * turn_c + c * turn_s)
 
 
-@bare_inner_kernel
+@bare_shared_kernel
 def coast_proven_everywhere(
     scene: Scene,
     lib: LatticeArrays,
@@ -325,7 +325,7 @@ def clear_of_static(
     return free >= t
 
 
-@bare_inner_kernel
+@bare_shared_kernel
 def may_stay(
     scene: Scene,
     lib: LatticeArrays,

@@ -27,7 +27,7 @@ from maneuver_automaton.words._kernels_library import class_of
 from maneuver_automaton.words.library import Scratch
 
 
-@bare_inner_kernel
+@bare_shared_kernel
 def edge_proven(
     scene: Scene,
     lib: LatticeArrays,
