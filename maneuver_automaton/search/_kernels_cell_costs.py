@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.search._kernels_cell_turns import (
     TINY,
-    Four,
-    Three,
+    UNKNOWN,
+    ClosedForm,
     after_straight,
     before_straight,
     on_line_and_circle,
@@ -26,23 +26,13 @@ from maneuver_automaton.search._kernels_cell_turns import (
     three_turns,
 )
 from maneuver_automaton.search._kernels_problem import WordProblem
-from maneuver_automaton.words._kernels_steering import phase, unit
-
-Ways = tuple[complex, complex, complex]
-
-# The position of the free trim among the triple, and the goal's heading; the free trim; the
-# turn rates and velocities of the triple; at_1, at_2; d without the free trim, and its centre
-# and arm where that turns; the price of the free trim and of the triple; phases and lengths of
-# at_1 and at_2.
-ClosedForm = tuple[
-    tuple[int, float], tuple[complex, float], Three, Ways, tuple[complex, complex], Ways, Four, Four
-]
+from maneuver_automaton.words._kernels_steering import length, phase, radius_of, unit
 
 COARSE = 2  # stretches of all cells of a word, which are looked at first
-PARTS = 8  # of a cell, for which bounds are computed in the end
+PARTS = 4  # of a cell, for which bounds are computed in the end
 
 
-@inner_kernel
+@bare_inner_kernel
 def mark_cheap_cells(known: ClosedForm, reach: float, most: float, live: NDArray[np.bool_]) -> bool:
     """Fill `live` (2, nodes): cells of the free time where a branch may cost less than `most`."""
     # They part [0, reach] evenly; `most` is without what the word costs besides coasting. Many are
@@ -50,9 +40,8 @@ def mark_cheap_cells(known: ClosedForm, reach: float, most: float, live: NDArray
     # bounds get close as cells get small, and a bound takes less than a node of the scan. False if
     # none is live.
     live[:] = False
-    found = False
+    found, stack = False, known.stretches
     parts = PARTS * live.shape[1]
-    stack = np.empty((40, 2), dtype=np.int64)
     top = 0
     for k in range(COARSE - 1, -1, -1):
         stack[top, 0], stack[top, 1] = k * parts // COARSE, (k + 1) * parts // COARSE
@@ -100,44 +89,60 @@ def has_bounds(problem: WordProblem, word: IntArray, triple: IntArray, q: int) -
 
 
 @bare_inner_kernel
-def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) -> ClosedForm:
+def closed_form(
+    problem: WordProblem, word: IntArray, triple: IntArray, q: int, stretches: IntArray
+) -> ClosedForm:
     """What the closed form of a word has for every time at `q`."""
-    twists = problem.library.twists
+    twists, rates, goal = problem.library.twists, problem.library.rates, problem.library.goal
     free, a, b, c = word[q], word[triple[0]], word[triple[1]], word[triple[2]]
     v_q, w_q = complex(twists[free, 0], twists[free, 1]), twists[free, 2]
-    v_a, w_a = complex(twists[a, 0], twists[a, 1]), twists[a, 2]
-    v_b, w_b = complex(twists[b, 0], twists[b, 1]), twists[b, 2]
-    v_c, w_c = complex(twists[c, 0], twists[c, 1]), twists[c, 2]
-    r_a = -1j * v_a / w_a if w_a != 0.0 else 0j
-    r_b = -1j * v_b / w_b if w_b != 0.0 else 0j
-    r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
-    d = (
-        complex(problem.library.goal[0], problem.library.goal[1])
-        + r_a
-        - r_c * unit(problem.library.goal[2])
-    )
+    r_a, r_b, r_c = radius(twists[a]), radius(twists[b]), radius(twists[c])
+    at_1, at_2, facing = r_a - r_b, r_b - r_c, unit(goal[2])
+    d = complex(goal[0], goal[1]) + r_a - r_c * facing
     centre, arm = d, 0j
     if q < triple[0] and w_q != 0.0:
-        r_q = -1j * v_q / w_q
+        r_q = radius(twists[free])
         centre, arm = d - r_a + r_q, r_a - r_q
     place = 0
     while place < 3 and q > triple[place]:
         place += 1
-    return (
-        (place, problem.library.goal[2]),
-        (v_q, w_q),
-        (w_a, w_b, w_c),
-        (v_a, v_b, v_c),
-        (r_a - r_b, r_b - r_c),
+    left, right, straight = UNKNOWN, UNKNOWN, 0j
+    for i in range(4):
+        rate, turn_rate = rates[word[i]], twists[word[i], 2]
+        if turn_rate > 0.0:
+            left = min(left, rate / turn_rate)
+        elif turn_rate < 0.0:
+            right = min(right, -rate / turn_rate)
+        elif i != q:
+            straight = complex(twists[word[i], 0], twists[word[i], 1])
+    return ClosedForm(
+        place,
+        (v_q, w_q, length(v_q), rates[free]),
+        (np.sign(twists[a, 2]), np.sign(twists[b, 2]), np.sign(twists[c, 2])),
+        (price(problem, a), price(problem, b), price(problem, c)),
+        (straight, phase(straight), length(straight)),
+        (left, right),
+        (at_1, at_2),
+        (phase(at_1), phase(at_2), length(at_1), length(at_2)),
         (d, centre, arm),
-        (
-            problem.library.rates[free],
-            problem.library.rates[a],
-            problem.library.rates[b],
-            problem.library.rates[c],
-        ),
-        (phase(r_a - r_b), phase(r_b - r_c), abs(r_a - r_b), abs(r_b - r_c)),
+        (length(centre), length(arm)),
+        (goal[2], facing),
+        stretches,
     )
+
+
+@bare_inner_kernel
+def price(problem: WordProblem, trim: int) -> float:
+    """Of a radian of a turn, of a second of a straight."""
+    rate: float = problem.library.rates[trim]
+    turn_rate = abs(problem.library.twists[trim, 2])
+    return rate / turn_rate if turn_rate > 0.0 else rate
+
+
+@bare_inner_kernel
+def radius(twist: Array) -> complex:
+    """From the centre of a turn to the pose; 0 for a straight."""
+    return radius_of(complex(twist[0], twist[1]), twist[2])
 
 
 @bare_inner_kernel
@@ -145,62 +150,57 @@ def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, floa
     """Lower bounds of what coasting costs in a word whose free time is from `low` to `high`."""
     # For both branches of the closed form, as in `steer`: three turns are ``at_1 e^{i h_1} + at_2
     # e^{i h_2} = d``, the headings after the first two unknown; a straight brings its time instead.
-    (place, heading), (v_q, w_q), turn_rates, velocities, (at_1, at_2), ways, rates, polar = known
-    phase_1, phase_2, one, two = polar
-    v_a, v_b, v_c = velocities
-    w_a, w_b, w_c = turn_rates
-    d, centre, arm = ways
+    (v_q, w_q, speed, rate), (a, b, c), (at_1, at_2) = known.free, known.sides, known.at
+    (phase_1, phase_2, one, two), (d, centre, arm), (far, wide) = (
+        known.polar,
+        known.ways,
+        known.sizes,
+    )
+    heading, facing = known.goal
     half = 0.5 * (high - low)
     time = low + half
     # `d` in the frame of the start. A leading trim turns about its centre: the place and the frame
-    # from which the others start run along circles, so that d does, too.
-    turned, spread = 0.0, 0.0  # by the leading trim, and by how much more or less in the cell
-    if place == 0 and w_q != 0.0:
+    # from which the others start run along circles, so that d does, too. By how much it turns, as a
+    # number as well, and by how much more or less in the cell.
+    turned, turn, spread = 0.0, 1.0 + 0j, 0.0
+    if known.place == 0 and w_q != 0.0:
         turned, spread = w_q * time, abs(w_q) * half
-        d = centre + arm * unit(turned)
-        around, within = abs(arm) * spread, abs(centre) * spread
+        turn = unit(turned)
+        d = centre + arm * turn
+        around, within = wide * spread, far * spread
     else:
-        around = within = abs(v_q) * half
+        around = within = speed * half
         # A straight between others is pushed to the end of the word: how much longer or shorter
         # it is moves the end that far in whatever direction.
-        if place == 0:
+        if known.place == 0:
             d -= v_q * time
-        elif place == 1:
+        elif known.place == 1:
             at_1 += v_q * time
-            phase_1, one = phase(at_1), abs(at_1)
+            phase_1, one = phase(at_1), length(at_1)
         else:
             at_2 += v_q * time
-            phase_2, two = phase(at_2), abs(at_2)
-    size = abs(d) + one + two + abs(centre)
+            phase_2, two = phase(at_2), length(at_2)
+    size = length(d) + one + two + far
     around += TINY * size  # radius of the disc about d in the frame of the start,
     within += TINY * size  # and in the frame from which the three are steered
-    prices = rates[1], rates[2], rates[3]
-    begun = rates[0] * low * (1.0 - TINY)
-    if w_a != 0.0 and w_b != 0.0 and w_c != 0.0:
+    begun, rest = rate * low * (1.0 - TINY), heading - w_q * low
+    if a != 0.0 and b != 0.0 and c != 0.0:
         if min(one, two) <= TINY * size:
             return begun, begun
-        later, earlier = three_turns(
-            (phase_1, phase_2, one, two), d, around, spread, turned, heading, turn_rates, prices
-        )
-        return begun + later, begun + earlier
-    if w_b == 0.0:
-        later, earlier = straight_between(
-            at_1 + at_2, v_b, d, around, spread, turned, heading, (w_a, w_c), prices
-        )
-        return begun + later, begun + earlier
-    if w_a == 0.0:  # the place from which the two turns lead to the goal lies on a line
-        spans = on_line_and_circle(d * unit(-turned) - at_1, v_a, two, within)
-        ahead = phase(v_a) - phase_2
+        polar = phase_1, phase_2, one, two
+        later, earlier = three_turns(known, polar, d, (around, turned, spread), rest)
+    elif b == 0.0:
+        later, earlier = straight_between(known, at_1 + at_2, d, (around, turned, spread), rest)
+    elif a == 0.0:  # the place from which the two turns lead to the goal lies on a line
+        spans = on_line_and_circle(known, d * turn.conjugate() - at_1, two, within)
+        ahead = known.straight[1] - phase_2
         left = heading - turned - ahead
-        return (
-            begun + after_straight(spans[0], ahead, left, spread, (w_b, w_c), prices),
-            begun + after_straight(spans[1], ahead, left, spread, (w_b, w_c), prices),
-        )
-    # the same from the goal back
-    spans = on_line_and_circle(d * unit(-heading) - at_2, v_c, one, around)
-    ahead = phase(v_c) - phase_1
-    left = heading - turned + ahead
-    return (
-        begun + before_straight(spans[0], ahead, left, spread, (w_a, w_b), prices),
-        begun + before_straight(spans[1], ahead, left, spread, (w_a, w_b), prices),
-    )
+        later = after_straight(known, spans[0], ahead, left, spread, rest)
+        earlier = after_straight(known, spans[1], ahead, left, spread, rest)
+    else:  # the same from the goal back
+        spans = on_line_and_circle(known, d * facing.conjugate() - at_2, one, around)
+        ahead = known.straight[1] - phase_1
+        left = heading - turned + ahead
+        later = before_straight(known, spans[0], ahead, left, spread, rest)
+        earlier = before_straight(known, spans[1], ahead, left, spread, rest)
+    return begun + later, begun + earlier

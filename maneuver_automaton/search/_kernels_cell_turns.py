@@ -8,9 +8,11 @@ the intervals are widened: so the bounds hold as they are computed, too.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel
-from maneuver_automaton.words._kernels_steering import phase
+from maneuver_automaton.words._kernels_steering import length, phase
 
 Three = tuple[float, float, float]
 
@@ -18,57 +20,81 @@ Four = tuple[float, float, float, float]
 
 ROUNDING = 1e-7  # [rad] by which an angle may be off: arc cosines lose half of the digits
 TINY = 1e-9  # relative, of lengths and costs
+FULL = 2.0 * math.pi
+PER_RADIAN = 1.0 / FULL
+UNKNOWN = 1e300  # price of what no trim does: finite, as none of it is to cost nothing
+
+
+class ClosedForm(NamedTuple):
+    """What the closed form of a word has for every time of its free trim."""
+
+    place: int  # of the free trim among the triple
+    free: tuple[complex, float, float, float]  # its velocity, turn rate, speed and price
+    sides: Three  # of the triple: 1 where a trim turns to the left, -1 to the right, 0 for straight
+    prices: Three  # of a radian of its turns, and of a second of its straight
+    straight: tuple[complex, float, float]  # velocity, direction and speed of the one solved for
+    radian: tuple[float, float]  # least prices of a radian to the left and to the right
+    at: tuple[complex, complex]  # at_1 and at_2,
+    polar: Four  # their phases and their lengths
+    ways: tuple[complex, complex, complex]  # d without the free trim; its centre and its arm,
+    sizes: tuple[float, float]  # and how long these are, where the free trim turns
+    goal: tuple[float, complex]  # its heading, also as a number
+    stretches: IntArray  # (40, 2) of cells that are looked at next
 
 
 @bare_inner_kernel
 def after_straight(
-    span: Four,
-    ahead: float,
-    left: float,
-    spread: float,
-    turn_rates: tuple[float, float],
-    prices: Three,
+    known: ClosedForm, span: Four, ahead: float, left: float, spread: float, rest: float
 ) -> float:
     """Lower bound for straight, turn, turn, where a line and a circle meet within `span`."""
     first, last, angle, other = span
     if last < 0.0:
         return math.inf
-    cost = prices[0] * max(first, 0.0)
-    cost += prices[1] * least_turn(ahead + angle, ahead + other, turn_rates[0])
-    return cost + prices[2] * least_turn(
-        left - other - spread, left - angle + spread, turn_rates[1]
-    )
+    _, b, c = known.sides
+    one = least_turn(ahead + angle, ahead + other, b)
+    two = least_turn(left - other - spread, left - angle + spread, c)
+    return least_cost(known, (max(first, 0.0), one, two), rest)
 
 
 @bare_inner_kernel
 def before_straight(
-    span: Four,
-    ahead: float,
-    left: float,
-    spread: float,
-    turn_rates: tuple[float, float],
-    prices: Three,
+    known: ClosedForm, span: Four, ahead: float, left: float, spread: float, rest: float
 ) -> float:
     """Lower bound for turn, turn, straight, where a line and a circle meet within `span`."""
     first, last, angle, other = span
     if last < 0.0:
         return math.inf
-    cost = prices[2] * max(first, 0.0)
-    cost += prices[0] * least_turn(left + angle - spread, left + other + spread, turn_rates[0])
-    return cost + prices[1] * least_turn(-ahead - other, -ahead - angle, turn_rates[1])
+    a, b, _ = known.sides
+    one = least_turn(left + angle - spread, left + other + spread, a)
+    two = least_turn(-ahead - other, -ahead - angle, b)
+    return least_cost(known, (one, two, max(first, 0.0)), rest)
 
 
 @bare_inner_kernel
-def least_turn(low: float, high: float, turn_rate: float) -> float:
-    """Least time in which a turn by some angle from `low` to `high` is made, whole turns aside."""
-    full = 2.0 * math.pi
-    if turn_rate < 0.0:
+def least_turn(low: float, high: float, side: float) -> float:
+    """Least angle of a turn to one side by some angle from `low` to `high`, whole turns aside."""
+    if side < 0.0:
         low, high = -high, -low
     low, high = low - ROUNDING, high + ROUNDING
-    turns = math.floor(low / full)
-    if high >= full * (turns + 1.0):  # a whole number of turns is among them
+    turns = math.floor(low * PER_RADIAN)
+    if high >= FULL * (turns + 1.0):  # a whole number of turns is among them
         return 0.0
-    return (low - full * turns) / abs(turn_rate)
+    return low - FULL * turns
+
+
+@bare_inner_kernel
+def least_cost(known: ClosedForm, least: Three, rest: float) -> float:
+    """Lower bound where turns and times of the triple are `least`, and all turns make up `rest`."""
+    cost = 0.0
+    for s in range(3):
+        cost += known.prices[s] * least[s]
+        rest -= known.sides[s] * least[s]
+    # What these turns do not make of it is turned at the best price, to the left or to the right.
+    left = rest - FULL * math.floor(rest * PER_RADIAN)
+    price_left, price_right = known.radian
+    return cost + min(
+        price_left * max(left - ROUNDING, 0.0), price_right * max(FULL - left - ROUNDING, 0.0)
+    )
 
 
 @bare_inner_kernel
@@ -94,19 +120,15 @@ def widest_corner(one: float, other: float, low: float, high: float) -> float:
 
 @bare_inner_kernel
 def three_turns(
-    polar: Four,
-    d: complex,
-    around: float,
-    spread: float,
-    turned: float,
-    heading: float,
-    turn_rates: Three,
-    prices: Three,
+    known: ClosedForm, polar: Four, d: complex, within: Three, rest: float
 ) -> tuple[float, float]:
     """Lower bounds of three turns: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` in a disc about `d`."""
-    # `polar` has the phases and the lengths of at_1 and at_2.
+    # `polar` has the phases and the lengths of at_1 and at_2; `within` the disc's radius, the angle
+    # by which the leading trim turns, and by how much more or less.
+    around, turned, spread = within
+    a, b, c = known.sides
     phase_1, phase_2, one, two = polar
-    way, aim = abs(d), phase(d)
+    way, aim = length(d), phase(d)
     low = max(way - around, abs(one - two), TINY * (one + two))
     high = min(way + around, one + two)
     if low > high:  # the circles do not meet
@@ -121,48 +143,41 @@ def three_turns(
     # between at_1 e^{i h_1} and at_2 e^{i h_2}: the longer d, the narrower
     widest, narrowest = begin_low + end_low, begin_high + end_high
     first, middle = aim - turned - phase_1, phase_1 - phase_2
-    last, wide = heading - aim + phase_2, off + spread
+    last, wide = known.goal[0] - aim + phase_2, off + spread
     # the angle of at_1 e^{i h_1} is that of d plus a corner on one branch, minus on the other
-    plus = prices[0] * least_turn(
-        first + nearest_1 - wide, first + farthest_1 + wide, turn_rates[0]
+    plus = (
+        least_turn(first + nearest_1 - wide, first + farthest_1 + wide, a),
+        least_turn(middle - widest, middle - narrowest, b),
+        least_turn(last + nearest_2 - off, last + farthest_2 + off, c),
     )
-    plus += prices[1] * least_turn(middle - widest, middle - narrowest, turn_rates[1])
-    plus += prices[2] * least_turn(last + nearest_2 - off, last + farthest_2 + off, turn_rates[2])
-    minus = prices[0] * least_turn(
-        first - farthest_1 - wide, first - nearest_1 + wide, turn_rates[0]
+    minus = (
+        least_turn(first - farthest_1 - wide, first - nearest_1 + wide, a),
+        least_turn(middle + narrowest, middle + widest, b),
+        least_turn(last - farthest_2 - off, last - nearest_2 + off, c),
     )
-    minus += prices[1] * least_turn(middle + narrowest, middle + widest, turn_rates[1])
-    minus += prices[2] * least_turn(last - farthest_2 - off, last - nearest_2 + off, turn_rates[2])
-    return plus, minus
+    return least_cost(known, plus, rest), least_cost(known, minus, rest)
 
 
 @bare_inner_kernel
 def straight_between(
-    still: complex,
-    velocity: complex,
-    d: complex,
-    around: float,
-    spread: float,
-    turned: float,
-    heading: float,
-    turn_rates: tuple[float, float],
-    prices: Three,
+    known: ClosedForm, still: complex, d: complex, within: Three, rest: float
 ) -> tuple[float, float]:
     """Lower bounds of turn, straight, turn: ``(still + velocity t) e^{i h}`` in a disc at `d`."""
     # Along the straight the vector is (along, aside), of which only the first changes.
-    speed = abs(velocity)
+    (velocity, ahead, speed), (around, turned, spread) = known.straight, within
+    a, _, c = known.sides
     if not speed > 0.0:
         return 0.0, 0.0
     begin = (still * velocity.conjugate()).real / speed
     aside = (still * velocity.conjugate()).imag / speed
-    way = abs(d)
+    way = length(d)
     low, high = max(way - around, 0.0), way + around
     if high < abs(aside):
         return math.inf, math.inf
     nearest = math.sqrt(max(0.0, (low - aside) * (low + aside)))
     farthest = math.sqrt(max(0.0, (high - aside) * (high + aside)))
-    aim, ahead = phase(d), phase(velocity)
-    first, last = aim - turned - ahead, heading - aim + ahead
+    aim = phase(d)
+    first, last = aim - turned - ahead, known.goal[0] - aim + ahead
     off = math.asin(around / way) if around < way else math.pi
     if abs(aside) <= around and nearest <= around:  # the vector may vanish: it has any direction
         off = math.pi
@@ -171,28 +186,32 @@ def straight_between(
     straight = math.copysign(math.pi, aside)  # the way back is as far from it as the way ahead
     later, earlier = math.inf, math.inf
     if farthest - begin >= -TINY * (speed + high):
-        later = prices[1] * max(0.0, (nearest - begin) / speed)
-        later += prices[0] * least_turn(
-            first - other - off - spread, first - one + off + spread, turn_rates[0]
+        turn = least_turn(first - other - off - spread, first - one + off + spread, a)
+        times = (
+            turn,
+            max(0.0, (nearest - begin) / speed),
+            least_turn(last + one - off, last + other + off, c),
         )
-        later += prices[2] * least_turn(last + one - off, last + other + off, turn_rates[1])
+        later = least_cost(known, times, rest)
     if -nearest - begin >= -TINY * (speed + high):
-        earlier = prices[1] * max(0.0, (-farthest - begin) / speed)
         one, other = straight - other, straight - one
-        earlier += prices[0] * least_turn(
-            first - other - off - spread, first - one + off + spread, turn_rates[0]
+        turn = least_turn(first - other - off - spread, first - one + off + spread, a)
+        times = (
+            turn,
+            max(0.0, (-farthest - begin) / speed),
+            least_turn(last + one - off, last + other + off, c),
         )
-        earlier += prices[2] * least_turn(last + one - off, last + other + off, turn_rates[1])
+        earlier = least_cost(known, times, rest)
     return later, earlier
 
 
 @bare_inner_kernel
 def on_line_and_circle(
-    point: complex, velocity: complex, radius: float, within: float
+    known: ClosedForm, point: complex, radius: float, within: float
 ) -> tuple[Four, Four]:
     """Where ``point - velocity t`` has the length `radius`, the point being in a disc."""
     # Later and earlier: the times from and to, and the angles to the velocity; below zero for none.
-    speed = abs(velocity)
+    velocity, _, speed = known.straight
     if not speed > 0.0 or not radius > TINY * within:
         return (0.0, math.inf, 0.0, 7.0), (0.0, math.inf, 0.0, 7.0)
     along = (point * velocity.conjugate()).real / speed

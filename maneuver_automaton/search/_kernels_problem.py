@@ -90,6 +90,24 @@ class Links(NamedTuple):
     gains: Array  # (m, C, C) what a transition adds to each linear condition
 
 
+class Nodes(NamedTuple):
+    """Room to look at a word with one free time, at N + 1 nodes of it at most, on both branches."""
+
+    live: NDArray[np.bool_]  # (2, N) cells between nodes that may be cheap enough
+    unused: IntArray  # (2, N + 1) a bit for each trim of the triple that lasts no time
+    stretches: IntArray  # (40, 2) of cells that are looked at next
+    times: Array  # (2, N + 1, 4) of its trims
+    values: Array  # (2, N + 1) of what is to vanish, NaN where there is none
+    costs: Array  # (2, N + 1)
+    ends: Array  # (N,) free times at which branches end, where they do in a cell
+    stack: Array  # (3, 24, 4) intervals: times at both ends; values there, bend, how often halved
+    both: Array  # (2, 3) times of the triple
+    twists: Array  # (4, 4) of the word's trims
+    columns: Array  # (4, 3) derivatives of its end by the times
+    work: Array  # (3, 4) times in the middle of an interval, the least and the greatest
+    span: Array  # (2, 2) values of linear conditions
+
+
 class Candidates(NamedTuple):
     """Starting points for Newton, filled by the scan and emptied by `polish_candidates`."""
 
@@ -100,6 +118,7 @@ class Candidates(NamedTuple):
     counter: IntArray  # (3,): candidates, words looked at, steering calls
     turns: IntArray  # (3, S) integers to work with
     work: Array  # (S,) numbers to work with
+    nodes: Nodes
 
 
 class Found(NamedTuple):

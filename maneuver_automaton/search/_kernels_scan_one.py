@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.search._kernels_cell_costs import (
-    ClosedForm,
     closed_form,
     has_bounds,
     least_costs,
     mark_cheap_cells,
 )
-from maneuver_automaton.search._kernels_cell_turns import TINY
+from maneuver_automaton.search._kernels_cell_turns import TINY, ClosedForm
 from maneuver_automaton.search._kernels_problem import (
     Candidates,
     WordProblem,
@@ -37,15 +37,17 @@ from maneuver_automaton.search._kernels_triple import (
     FreeTime,
     evaluate,
     levels,
-    solve_triple,
+    solve,
     take_branch,
     unwrap,
-    with_free_time,
 )
 from maneuver_automaton.words._kernels_times import assign
 
+NOTHING = 1e-7  # [s] that only rounding leaves of a time: arc cosines lose half of the digits
+LEAST_NODES = 8
 
-@inner_kernel
+
+@bare_inner_kernel
 def scan_one(
     problem: WordProblem,
     candidates: Candidates,
@@ -55,100 +57,149 @@ def scan_one(
     upper_bound: float,
 ) -> None:
     """Words with one free time: roots of a scalar function along both branches."""
-    q = 6 - triple[0] - triple[1] - triple[2]
-    m = problem.library.targets.size
+    room, q = candidates.nodes, 6 - triple[0] - triple[1] - triple[2]
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return
-    nodes = max(8, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
+    nodes = max(LEAST_NODES, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
     # cells between nodes in which a branch may be cheap enough: the others have no solution that
     # counts, and most words have none of these
-    live = np.ones((2, nodes), dtype=np.bool_)
-    known = closed_form(problem, word, triple, q)
+    live, four = room.live[:, :nodes], FreeTime(word, n, triple, q)
+    live[:] = True
+    known = closed_form(problem, word, triple, q, room.stretches)
     cheap = np.inf  # what its trims may cost
-    if m == 0 and upper_bound < np.inf and has_bounds(problem, word, triple, q):
+    bounded = problem.library.targets.size == 0 and upper_bound < np.inf
+    if bounded and has_bounds(problem, word, triple, q):
         cheap = upper_bound + TINY * (1.0 + abs(upper_bound))
         cheap -= problem.terms.pad_cost + word_extra(problem, word, n)
         if not mark_cheap_cells(known, reach, cheap, live):
             return
-    four = with_free_time(problem, word, n, triple)
-    needed = np.zeros((2, nodes + 1), dtype=np.bool_)  # a cell's nodes, and one on either side
-    for branch in range(2):
-        for j in range(nodes):
-            if live[branch, j]:
-                for k in range(max(j - 1, 0), min(j + 2, nodes) + 1):
-                    needed[branch, k] = True
-    times = np.zeros(n)
-    there = np.zeros((2, nodes + 1), dtype=np.bool_)
-    node_times = np.zeros((2, nodes + 1, n))
-    node_values = np.zeros((2, nodes + 1))
-    costs = np.zeros((2, nodes + 1))
-    steering = (
-        problem.library.twists,
-        problem.library.goal,
-        problem.scan.tolerance,
-        candidates.counter,
-    )
+    for i in range(n):
+        assign(room.twists[i], problem.library.twists[word[i]])
+    solve_nodes(problem, candidates, four, live, reach)
     most = nearly_cheap(problem, word, n, upper_bound)
-    for j in range(nodes + 1):
-        if not (needed[0, j] or needed[1, j]):
-            continue
-        times[q] = reach * j / nodes
-        solve_triple(steering, word, n, triple, times, four.both)
-        for branch in range(2):
-            if not needed[branch, j]:
-                continue
-            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], four.both[branch])
-            value = take_branch(problem, four, branch, times)
-            if not math.isnan(value):
-                there[branch, j] = True
-                assign(node_times[branch, j], times)
-                if m == 0:
-                    node_values[branch, j] = value
-                elif j > 0 and there[branch, j - 1]:  # continuous from node to node
-                    unwrap(problem, word, triple, node_times[branch, j - 1], times)
-                    step = condition(problem, word, n, m - 1, times)
-                    step -= condition(problem, word, n, m - 1, node_times[branch, j - 1])
-                    node_values[branch, j] = node_values[branch, j - 1] + step
-                else:
-                    node_values[branch, j] = condition(problem, word, n, m - 1, times)
-    ends = np.full(nodes, math.nan)  # free times at which branches end, where they do in a cell
-    stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
     for branch in range(2):
         for j in range(nodes):
             if not live[branch, j]:
                 continue
-            if not may_be_cheap(costs[branch, j], costs[branch, j + 1], most):
+            if not may_be_cheap(room.costs[branch, j], room.costs[branch, j + 1], most):
                 continue
-            if not (there[branch, j] or there[branch, j + 1]):
-                continue
-            bend = np.inf
-            if j > 0 and j + 2 <= nodes and there[branch, j] and there[branch, j + 1]:
-                bend = 0.0
-                for k in range(j, j + 2):
-                    if there[branch, k - 1] and there[branch, k + 1]:
-                        second = node_values[branch, k - 1] - 2.0 * node_values[branch, k]
-                        bend = max(bend, 0.5 * abs(second + node_values[branch, k + 1]))
-                    else:
-                        bend = np.inf
-            low, high, numbers = stack
-            assign(low[0], node_times[branch, j])
-            assign(high[0], node_times[branch, j + 1])
-            low[0, q], high[0, q] = reach * j / nodes, reach * (j + 1) / nodes
-            numbers[0, 0], numbers[0, 1] = node_values[branch, j], node_values[branch, j + 1]
-            numbers[0, 2], numbers[0, 3] = bend, 0.0
-            here, beyond = (j, j + 1) if there[branch, j] else (j + 1, j)
-            if not there[branch, beyond]:  # both branches end in between, where they meet
-                if math.isnan(ends[j]):
-                    between = reach * here / nodes, reach * beyond / nodes
-                    ends[j] = end_of_branches(problem, candidates, four, between, branch)
-                edge = high[0] if beyond > here else low[0]
-                edge[q] = ends[j]
-                numbers[0, beyond - j] = evaluate(problem, candidates, four, edge, branch)
-            bisect(problem, candidates, four, branch, stack, known, cheap)
+            if first_interval(problem, candidates, four, branch, (j, nodes, reach), cheap < np.inf):
+                bisect(problem, candidates, four, branch, known, cheap)
 
 
-@inner_kernel
+@bare_inner_kernel
+def solve_nodes(
+    problem: WordProblem,
+    candidates: Candidates,
+    four: FreeTime,
+    live: NDArray[np.bool_],
+    reach: float,
+) -> None:
+    """Fill in the nodes of live cells, and one on either side of these."""
+    room, m, nodes = candidates.nodes, problem.library.targets.size, live.shape[1]
+    times, values = room.work[0], room.values
+    for j in range(nodes + 1):
+        values[0, j], values[1, j] = math.nan, math.nan
+        if j < nodes:
+            room.ends[j] = math.nan
+        if not (is_wanted(live, 0, j) or is_wanted(live, 1, j)):
+            continue
+        times[four.q] = reach * j / nodes
+        solve(problem, candidates, four, times)
+        for branch in range(2):
+            if not is_wanted(live, branch, j):
+                continue
+            room.costs[branch, j] = coasting_cost(
+                problem, four.word, four.triple, four.q, times[four.q], room.both[branch]
+            )
+            value = take_branch(problem, room, four, branch, times)
+            if math.isnan(value):
+                continue
+            assign(room.times[branch, j], times)
+            room.unused[branch, j] = unused_trims(problem, four, times)
+            if m > 0:
+                value = condition(problem, four.word, four.n, m - 1, times)
+                if j > 0 and not math.isnan(values[branch, j - 1]):  # continuous from node to node
+                    unwrap(problem, four.word, four.triple, room.times[branch, j - 1], times)
+                    step = condition(problem, four.word, four.n, m - 1, times)
+                    step -= condition(problem, four.word, four.n, m - 1, room.times[branch, j - 1])
+                    value = values[branch, j - 1] + step
+            values[branch, j] = value
+
+
+@bare_inner_kernel
+def is_wanted(live: NDArray[np.bool_], branch: int, j: int) -> bool:
+    """Whether a node is at an end of a live cell, or next to one that is."""
+    wanted = False
+    for cell in range(max(j - 2, 0), min(j + 2, live.shape[1])):
+        wanted = wanted or live[branch, cell]
+    return wanted
+
+
+@bare_inner_kernel
+def unused_trims(problem: WordProblem, four: FreeTime, times: Array) -> int:
+    """A bit for each trim of the triple that lasts no time, or a full turn."""
+    unused = 0
+    for s in range(3):
+        i = four.triple[s]
+        if min(abs(times[i]), problem.trims.periods[four.word[i]] - times[i]) <= NOTHING:
+            unused |= 1 << s
+    return unused
+
+
+@bare_inner_kernel
+def first_interval(
+    problem: WordProblem,
+    candidates: Candidates,
+    four: FreeTime,
+    branch: int,
+    cell: tuple[int, int, float],
+    pruned: bool,
+) -> bool:
+    """Put a cell of a branch onto the stack; False where there is nothing to look for."""
+    room, (j, nodes, reach) = candidates.nodes, cell
+    values, low, high, numbers = (
+        room.values[branch],
+        room.stack[0, 0],
+        room.stack[1, 0],
+        room.stack[2, 0],
+    )
+    at_low, at_high = not math.isnan(values[j]), not math.isnan(values[j + 1])
+    if not (at_low or at_high):
+        return False
+    bend = np.inf
+    if 0 < j < nodes - 1:
+        bend = max(bend_at(values, j), bend_at(values, j + 1))
+    assign(low, room.times[branch, j])
+    assign(high, room.times[branch, j + 1])
+    low[four.q], high[four.q] = reach * j / nodes, reach * (j + 1) / nodes
+    numbers[0], numbers[1], numbers[2], numbers[3] = values[j], values[j + 1], bend, 0.0
+    if pruned:
+        # A trim that lasts no time at both ends does not in between, where that is no chance: what
+        # there is to find is a shorter word, and the gradient is nothing but rounding.
+        one = room.unused[branch, j if at_low else j + 1]
+        if one & room.unused[branch, j + 1 if at_high else j]:
+            return False
+    here, beyond = (j, j + 1) if at_low else (j + 1, j)
+    if not (at_low and at_high):  # both branches end in between, where they meet
+        if math.isnan(room.ends[j]):
+            between = reach * here / nodes, reach * beyond / nodes
+            room.ends[j] = end_of_branches(problem, candidates, four, between, branch)
+        edge = high if beyond > here else low
+        edge[four.q] = room.ends[j]
+        numbers[beyond - j] = evaluate(problem, candidates, four, edge, branch)
+    return True
+
+
+@bare_inner_kernel
+def bend_at(values: Array, k: int) -> float:
+    """By how much a function bends at a node; inf where it is not known."""
+    second = values[k - 1] - 2.0 * values[k] + values[k + 1]
+    return np.inf if math.isnan(second) else 0.5 * abs(second)
+
+
+@bare_inner_kernel
 def end_of_branches(
     problem: WordProblem,
     candidates: Candidates,
@@ -158,7 +209,7 @@ def end_of_branches(
 ) -> float:
     """How far both branches go from a free time with solutions towards one without."""
     good, beyond = between
-    times = np.empty(four.n)
+    times = candidates.nodes.work[0]
     for _ in range(30):
         times[four.q] = 0.5 * (good + beyond)
         if math.isnan(evaluate(problem, candidates, four, times, branch)):
@@ -168,31 +219,28 @@ def end_of_branches(
     return good
 
 
-@inner_kernel
+@bare_inner_kernel
 def bisect(
     problem: WordProblem,
     candidates: Candidates,
     four: FreeTime,
     branch: int,
-    stack: tuple[Array, Array, Array],
     known: ClosedForm,
     cheap: float,
 ) -> None:
     """Halve the interval on the stack if below `cheap` and bent enough for roots; propose these."""
-    lows, highs, numbers = stack
-    word, n, triple, q = four.word, four.n, four.triple, four.q
-    m = problem.library.targets.size
-    middle = np.empty(n)
-    ends = np.empty((2, n))
-    span = np.empty((m, 2))
-    top = 0
+    room, word, n, triple, q = candidates.nodes, four.word, four.n, four.triple, four.q
+    lows, highs, numbers = room.stack[0], room.stack[1], room.stack[2]
+    middle, least, greatest = room.work[0], room.work[1], room.work[2]
+    top, m = 0, problem.library.targets.size
+    span = room.span[:m]
     while top >= 0:
         low, high = lows[top], highs[top]
         value_low, value_high, bend, depth = (
             numbers[top, 0], numbers[top, 1], numbers[top, 2], numbers[top, 3],
         )  # fmt: skip
         top -= 1
-        if cheap < np.inf and least_costs(known, low[q], high[q])[branch] > cheap:
+        if depth > 0.0 and cheap < np.inf and least_costs(known, low[q], high[q])[branch] > cheap:
             continue
         for i in range(n):
             middle[i] = 0.5 * (low[i] + high[i])
@@ -217,14 +265,14 @@ def bisect(
             settled = bend <= 0.5 * change
             before = candidates.counter[0]
             for i in range(n):
-                ends[0, i], ends[1, i] = min(low[i], high[i]), max(low[i], high[i])
-            levels(problem, candidates, word, n, middle, ends[0], ends[1], span)
+                least[i], greatest[i] = min(low[i], high[i]), max(low[i], high[i])
+            levels(problem, candidates, word, n, middle, least, greatest, span)
             possible = candidates.counter[0] > before
             if bend > 0.0:  # that was with room for the bend: only what is left counts
                 candidates.counter[0] = before
                 if possible and (settled or depth >= 8.0):
                     span[0, 0], span[0, 1] = min(at_low, at_high), max(at_low, at_high)
-                    levels(problem, candidates, word, n, middle, ends[0], ends[1], span)
+                    levels(problem, candidates, word, n, middle, least, greatest, span)
         if not possible or depth >= 8.0 or (settled and bend <= 0.25 * change):
             continue
         middle[q] = 0.5 * (low[q] + high[q])

@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, by_value, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, by_value
 from maneuver_automaton.search._kernels_problem import (
     Candidates,
+    Nodes,
     WordProblem,
     is_straight,
     propose,
     time_left,
 )
 from maneuver_automaton.words._kernels_steering import steer, unit
-from maneuver_automaton.words._kernels_times import assign, end_and_columns
+from maneuver_automaton.words._kernels_times import end_and_columns
 
 
 @bare_inner_kernel
@@ -110,39 +111,19 @@ def solve_triple(
 
 @by_value
 class FreeTime(NamedTuple):
-    """A word of four trims with one time free, and room to solve for the other three."""
+    """A word of four trims with one time free."""
 
     word: IntArray  # (n,)
     n: int
     triple: IntArray  # (3,) positions that are solved for
     q: int  # the position that is free
-    twists: Array  # (n, 4) of its trims
-    columns: Array  # (n, 3) derivatives of the end by the times
-    both: Array  # (2, 3) times of the triple on both branches
-
-
-@inner_kernel
-def with_free_time(problem: WordProblem, word: IntArray, n: int, triple: IntArray) -> FreeTime:
-    """A word of four trims, of which `triple` are solved for."""
-    twists = np.empty((n, 4))
-    for i in range(n):
-        assign(twists[i], problem.library.twists[word[i]])
-    return FreeTime(
-        word,
-        n,
-        triple,
-        6 - triple[0] - triple[1] - triple[2],
-        twists,
-        np.empty((n, 3)),
-        np.empty((2, 3)),
-    )
 
 
 @bare_inner_kernel
-def reduced_gradient(problem: WordProblem, four: FreeTime, times: Array) -> float:
+def reduced_gradient(problem: WordProblem, room: Nodes, four: FreeTime, times: Array) -> float:
     """How the cost changes with the free time, the other three following; NaN if singular."""
-    columns, rates, word = four.columns, problem.library.rates, four.word
-    end_and_columns(four.twists, times, columns)
+    columns, rates, word = room.columns, problem.library.rates, four.word
+    end_and_columns(room.twists, times, columns)
     # Cramer's rule: the three change so that the end stays where it is.
     a, b, c = four.triple[0], four.triple[1], four.triple[2]
     u0 = columns[b, 1] * columns[c, 2] - columns[b, 2] * columns[c, 1]
@@ -170,16 +151,26 @@ def reduced_gradient(problem: WordProblem, four: FreeTime, times: Array) -> floa
 
 
 @bare_inner_kernel
-def take_branch(problem: WordProblem, four: FreeTime, branch: int, times: Array) -> float:
+def take_branch(
+    problem: WordProblem, room: Nodes, four: FreeTime, branch: int, times: Array
+) -> float:
     """Fill `times` from a branch that is solved; the reduced gradient there, NaN if it is empty."""
     # With linear conditions these must vanish, and not the gradient: it is 0.
-    if math.isnan(four.both[branch, 0]):
+    if math.isnan(room.both[branch, 0]):
         return math.nan
     for s in range(3):
-        times[four.triple[s]] = four.both[branch, s]
+        times[four.triple[s]] = room.both[branch, s]
     if problem.library.targets.size > 0:
         return 0.0
-    return reduced_gradient(problem, four, times)
+    return reduced_gradient(problem, room, four, times)
+
+
+@bare_inner_kernel
+def solve(problem: WordProblem, candidates: Candidates, four: FreeTime, times: Array) -> None:
+    """Solve for the triple at a given free time."""
+    library = problem.library
+    steering = (library.twists, library.goal, problem.scan.tolerance, candidates.counter)
+    solve_triple(steering, four.word, four.n, four.triple, times, candidates.nodes.both)
 
 
 @bare_inner_kernel
@@ -187,10 +178,8 @@ def evaluate(
     problem: WordProblem, candidates: Candidates, four: FreeTime, times: Array, branch: int
 ) -> float:
     """Solve for the triple at a given free time, and take one branch."""
-    library = problem.library
-    steering = (library.twists, library.goal, problem.scan.tolerance, candidates.counter)
-    solve_triple(steering, four.word, four.n, four.triple, times, four.both)
-    return take_branch(problem, four, branch, times)
+    solve(problem, candidates, four, times)
+    return take_branch(problem, candidates.nodes, four, branch, times)
 
 
 @bare_inner_kernel

@@ -85,15 +85,14 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     """Words that cannot reach every pose: one or two subgroups, or straights only."""
     # The goal must lie where they can go. What each subgroup contributes follows in closed form;
     # the times are then the solution of a square linear system.
-    m = problem.library.targets.size
+    twists, m = problem.library.twists, problem.library.targets.size
     straight = True
     # Positions of the first trim of either subgroup; n: no trim is of it. One that only climbs or
     # rests is of none: it would be taken for parallel to any.
     begin, split = n, n
     for i in range(n):
-        if not is_straight(problem, word[i]):
-            straight = False
-        if not moves_in_plane(problem.library.twists[word[i]]):
+        straight = straight and is_straight(problem, word[i])
+        if not moves_in_plane(twists[word[i]]):
             continue
         if begin == n:
             begin = i
@@ -102,94 +101,84 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     rank = (begin < n) + (split < n)
     if n > rank + m:
         return
-    z = complex(problem.library.goal[0], problem.library.goal[1])
     heading = problem.library.goal[2]
     full = 2.0 * math.pi
     if straight:
         if abs(heading - full * round(heading / full)) > 1e-9:
             return
-        matrix = np.empty((2 + m, n))
-        rhs = np.empty(2 + m)
-        for i in range(n):
-            matrix[0, i] = problem.library.twists[word[i], 0]
-            matrix[1, i] = problem.library.twists[word[i], 1]
-            for r in range(m):
-                matrix[2 + r, i] = problem.library.rows[r, word[i]]
-        rhs[0], rhs[1] = z.real, z.imag
-        for r in range(m):
-            rhs[2 + r] = problem.library.targets[r]
+        matrix, rhs = with_conditions(problem, word, n, 2)
+        for k in range(2):
+            rhs[k] = problem.library.goal[k]
+            for i in range(n):
+                matrix[k, i] = twists[word[i], k]
         times, found_rank = least_squares(matrix, rhs, 1e-11)
         if found_rank == n:
             propose(problem, candidates, word, n, times)
         return
-    blocks = np.zeros(2)
-    w_1, w_2 = problem.library.twists[word[begin], 2], 0.0
-    v_1 = complex(problem.library.twists[word[begin], 0], problem.library.twists[word[begin], 1])
-    if rank == 1:
-        blocks[0] = heading
-    else:
-        w_2 = problem.library.twists[word[split], 2]
-        v_2 = complex(
-            problem.library.twists[word[split], 0], problem.library.twists[word[split], 1]
-        )
-        if w_1 != 0.0 and w_2 != 0.0:
-            r_1, r_2 = -1j * v_1 / w_1, -1j * v_2 / w_2
-            blocks[0] = phase((z + r_1 - r_2 * unit(heading)) / (r_1 - r_2))
-            blocks[1] = heading - blocks[0]
-        elif w_1 != 0.0:
-            rest = z + 1j * v_1 / w_1 * (unit(heading) - 1.0)
-            blocks[0] = heading
-            blocks[1] = (rest * (v_2 * unit(heading)).conjugate()).real / abs(v_2) ** 2
-        else:
-            rest = z + 1j * v_2 / w_2 * (unit(heading) - 1.0)
-            blocks[0] = (rest * v_1.conjugate()).real / abs(v_1) ** 2
-            blocks[1] = heading
-    blocks[0] = blocks[0] - full * round(blocks[0] / full) if w_1 != 0.0 else blocks[0]
-    blocks[1] = blocks[1] - full * round(blocks[1] / full) if w_2 != 0.0 else blocks[1]
+    second = word[split] if rank == 2 else -1
+    block_1, block_2 = blocks_of(problem, word[begin], second)
+    w_1, w_2 = twists[word[begin], 2], twists[second, 2] if rank == 2 else 0.0
+    block_1 -= full * round(block_1 / full) if w_1 != 0.0 else 0.0
+    block_2 -= full * round(block_2 / full) if w_2 != 0.0 else 0.0
     fastest = 0.0
     for i in range(n):
-        fastest = max(fastest, abs(problem.library.twists[word[i], 2]))
+        fastest = max(fastest, abs(twists[word[i], 2]))
     most = 1
     if problem.terms.more_turns == 1 and time_left(problem) < np.inf:
         most += math.floor(time_left(problem) * fastest / full)
     # Without other conditions each trim is the only one of its subgroup, and goes on in time.
     alone_1, alone_2 = m == 0, m == 0 and rank == 2
-    for turns_1 in range(-most if w_1 != 0.0 else 0, (most if w_1 != 0.0 else 0) + 1):
-        if alone_1 and (blocks[0] + full * turns_1) * (w_1 if w_1 != 0.0 else 1.0) < 0.0:
+    most_1, most_2 = most if w_1 != 0.0 else 0, most if w_2 != 0.0 else 0
+    for turns_1 in range(-most_1, most_1 + 1):
+        if alone_1 and (block_1 + full * turns_1) * (w_1 if w_1 != 0.0 else 1.0) < 0.0:
             continue
-        for turns_2 in range(-most if w_2 != 0.0 else 0, (most if w_2 != 0.0 else 0) + 1):
-            if alone_2 and (blocks[1] + full * turns_2) * (w_2 if w_2 != 0.0 else 1.0) < 0.0:
+        for turns_2 in range(-most_2, most_2 + 1):
+            if alone_2 and (block_2 + full * turns_2) * (w_2 if w_2 != 0.0 else 1.0) < 0.0:
                 continue
-            matrix = np.zeros((rank + m, n))
-            rhs = np.empty(rank + m)
-            rhs[0] = blocks[0] + full * turns_1
+            matrix, rhs = with_conditions(problem, word, n, rank)
+            rhs[0] = block_1 + full * turns_1
             if rank == 2:
-                rhs[1] = blocks[1] + full * turns_2
+                rhs[1] = block_2 + full * turns_2
             for i in range(n):
-                block = 0 if i < split else 1
-                head = word[begin] if i < split else word[split]
-                twist = problem.library.twists[word[i]]
-                if problem.library.twists[head, 2] != 0.0:
-                    matrix[block, i] = twist[2]
-                else:
-                    along = (
-                        problem.library.twists[head, 0] ** 2 + problem.library.twists[head, 1] ** 2
-                    )
-                    matrix[block, i] = (
-                        twist[0] * problem.library.twists[head, 0]
-                        + twist[1] * problem.library.twists[head, 1]
-                    ) / along
-                for r in range(m):
-                    matrix[rank + r, i] = problem.library.rows[r, word[i]]
-            for r in range(m):
-                rhs[rank + r] = problem.library.targets[r]
+                twist, head = twists[word[i]], twists[word[begin] if i < split else second]
+                pace = twist[2]
+                if head[2] == 0.0:
+                    pace = (twist[0] * head[0] + twist[1] * head[1]) / (head[0] ** 2 + head[1] ** 2)
+                matrix[0 if i < split else 1, i] = pace
             times, found_rank = least_squares(matrix, rhs, 1e-11)
-            positive = found_rank == n
-            for i in range(n):
-                if not times[i] > 1e-9:
-                    positive = False
-            if positive:
+            if found_rank == n and times.min() > 1e-9:
                 propose(problem, candidates, word, n, times)
+
+
+@inner_kernel
+def with_conditions(problem: WordProblem, word: IntArray, n: int, rows: int) -> tuple[Array, Array]:
+    """A linear system for the times of a word: `rows` to be filled in, then its conditions."""
+    m = problem.library.targets.size
+    matrix, rhs = np.zeros((rows + m, n)), np.empty(rows + m)
+    for r in range(m):
+        rhs[rows + r] = problem.library.targets[r]
+        for i in range(n):
+            matrix[rows + r, i] = problem.library.rows[r, word[i]]
+    return matrix, rhs
+
+
+@bare_inner_kernel
+def blocks_of(problem: WordProblem, first: int, second: int) -> tuple[float, float]:
+    """What trims parallel to the `first` and to the `second` contribute; -1 for no second one."""
+    z, heading = complex(problem.library.goal[0], problem.library.goal[1]), problem.library.goal[2]
+    if second < 0:
+        return heading, 0.0
+    one, other = problem.library.twists[first], problem.library.twists[second]
+    v_1, v_2, w_1, w_2 = complex(one[0], one[1]), complex(other[0], other[1]), one[2], other[2]
+    if w_1 != 0.0 and w_2 != 0.0:
+        r_1, r_2 = -1j * v_1 / w_1, -1j * v_2 / w_2
+        angle = phase((z + r_1 - r_2 * unit(heading)) / (r_1 - r_2))
+        return angle, heading - angle
+    if w_1 != 0.0:
+        rest = z + 1j * v_1 / w_1 * (unit(heading) - 1.0)
+        return heading, (rest * (v_2 * unit(heading)).conjugate()).real / abs(v_2) ** 2
+    rest = z + 1j * v_2 / w_2 * (unit(heading) - 1.0)
+    return (rest * v_1.conjugate()).real / abs(v_1) ** 2, heading
 
 
 @bare_inner_kernel

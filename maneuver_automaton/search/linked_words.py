@@ -20,7 +20,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import TIE, SearchResult, SearchStatus, TimedWord, in_order
-from maneuver_automaton.search.word_scan import WordScan
+from maneuver_automaton.search.word_scan import Extent, WordScan
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels
 from maneuver_automaton.words.library import NO_TRIM, four_columns
@@ -95,15 +95,14 @@ def scan_linked_words(
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
     everything = alternatives is None and upper_bound == math.inf
-    scan = WordScan(
-        problem,
-        setup.as_search(),
-        min(most, problem.horizon.max_trims or most),
-        None if later else alternatives,
+    extent = Extent(
+        most=min(most, problem.horizon.max_trims or most),
+        alternatives=None if later else alternatives,
         nodes=NODES,
         spare=pads,
         slack=math.inf if everything else SLACK,
     )
+    scan = WordScan(problem, setup.as_search(), extent)
     scan.begin(scan.setup, upper_bound=upper_bound * (1.0 + SLACK * later) + TIE)
     most_words = None if expansions is None else WORDS_AN_EXPANSION * expansions
     finished = scan.run(budget, most_words)

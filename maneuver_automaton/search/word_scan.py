@@ -28,10 +28,12 @@ from maneuver_automaton.search._kernels_problem import (
     Candidates,
     Found,
     Links,
+    Nodes,
     ScanSettings,
     WordProblem,
     WordTerms,
 )
+from maneuver_automaton.search._kernels_scan_one import LEAST_NODES
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import Columns, SearchSetup, columns
 from maneuver_automaton.words._kernels_times import TimesProblem
@@ -62,27 +64,29 @@ class Mode:
     seconds: float  # that a whole scan may take; inf where words are too long for one
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extent:
+    """Which words a scan looks at, and how closely."""
+
+    most: int  # trims
+    alternatives: int | None  # beside the cheapest; None for all
+    nodes: int = NODES
+    spare: bool = False
+    slack: float = math.inf
+
+
 class WordScan:
-    """A scan of all words of up to `most` trims: its buffers, and what it has found.
+    """A scan of all words of up to so many trims: its buffers, and what it has found.
 
     Where `not_first` is a trim of the automaton, fewer words need to be scanned: of the longest
     ones those that do not begin with it.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        setup: SearchSetup,
-        most: int,
-        alternatives: int | None,
-        *,
-        nodes: int = NODES,
-        spare: bool = False,
-        slack: float = math.inf,
-    ) -> None:
+    def __init__(self, problem: Problem, setup: SearchSetup, extent: Extent) -> None:
         self.automaton, self.cost, self.horizon = problem.automaton, problem.cost, problem.horizon
-        self.setup = setup
-        self.most, self.nodes, self.spare, self.slack = most, nodes, spare, slack
+        self.setup, alternatives = setup, extent.alternatives
+        self.most, self.nodes, self.spare = extent.most, extent.nodes, extent.spare
+        self.slack = extent.slack
         self.tables = tables(setup.library, free_heading=setup.free_heading)
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = terms_of(problem.cost) is None
@@ -133,6 +137,7 @@ class WordScan:
             counter=np.zeros(3, dtype=np.int64),
             turns=np.zeros((3, width), dtype=np.int64),
             work=np.zeros(width),
+            nodes=_room(self.nodes),
         )
         self.found = Found(
             words=np.empty((capacity + 1, width), dtype=np.int64),
@@ -343,30 +348,32 @@ class WordScan:
         return Word(trims=np.array(numbers, dtype=np.int64), durations=np.array(lasting), cost=cost)
 
 
+def _room(most: int) -> Nodes:
+    """Room for the nodes of a word's free time."""
+    n = max(most, LEAST_NODES)
+    live, unused = np.empty((2, n), dtype=np.bool_), np.empty((2, n + 1), dtype=np.int64)
+    nodes = (2, n + 1, 4), (2, n + 1), (2, n + 1), (n,)
+    others = (3, 24, 4), (2, 3), (4, 4), (4, 3), (3, 4), (2, 2)
+    stretches = np.empty((40, 2), dtype=np.int64)
+    return Nodes(live, unused, stretches, *[np.empty(shape) for shape in (*nodes, *others)])
+
+
 @kept_by_first
 def _idle(library: MovingTrims, *asked: Hashable) -> list[WordScan]:
     return []
 
 
-def scan_of(
-    problem: Problem,
-    setup: SearchSetup,
-    most: int,
-    alternatives: int | None,
-    *,
-    nodes: int = NODES,
-    spare: bool = False,
-) -> WordScan:
+def scan_of(problem: Problem, setup: SearchSetup, extent: Extent) -> WordScan:
     """A scan that begins; if there is one, in the memory of one that differs in the goal alone.
 
     For trims that switch at will. Once its results are read, it goes back to the `idle` ones.
     """
-    asked = problem.cost, problem.horizon, most, alternatives, nodes, spare
+    asked = problem.cost, problem.horizon, extent
     idle = _idle(setup.library, *asked, setup.free_heading, setup.climbs)
     try:
         job = idle.pop()
     except IndexError:  # asked for before, another thread might take the last one
-        job = WordScan(problem, setup, most, alternatives, nodes=nodes, spare=spare)
+        job = WordScan(problem, setup, extent)
     job.idle = idle
     return job
 

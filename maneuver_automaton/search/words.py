@@ -11,7 +11,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchResult, SearchStatus, in_order, tied
 from maneuver_automaton.search.setup import SearchSetup, search_setup
-from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan, scan_of
+from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, Extent, WordScan, scan_of
 from maneuver_automaton.words.word import Word
 
 MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
@@ -88,7 +88,7 @@ def search_words(
         )
     if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         return resting(problem, setup)
-    job = scan_of(problem, setup, most, alternatives, nodes=nodes)
+    job = scan_of(problem, setup, Extent(most=most, alternatives=alternatives, nodes=nodes))
     job.begin(setup, upper_bound=upper_bound, not_first=not_first)
     finished = job.run(budget, problem.search.max_expansions)
     solutions = tuple(in_order(_handed_over(job, budget)))
@@ -126,9 +126,10 @@ def search_setup_words(
     padded = problem.horizon.time is not None and setup.library.rest is not None
     exact = problem.horizon.time is not None and not padded
     most = conditions + int(exact)  # as far as so many are scanned
-    job = scan_of(
-        problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
-    )
+    most += int(padded)
+    spare = spare and padded
+    extent = Extent(most=most, alternatives=alternatives, nodes=SEED_NODES, spare=spare)
+    job = scan_of(problem, setup, extent)
     job.begin(setup)
     job.run(budget, None)
     cheapest: list[Word] = []

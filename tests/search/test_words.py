@@ -277,6 +277,17 @@ def test_a_full_circle_is_found_as_an_alternative():
 
 
 @compiled_only
+@pytest.mark.parametrize("time", [0.5, 1.0, 1.74230814])
+def test_a_word_of_one_trim_is_not_looked_for_among_longer_words(time):
+    """Cells in which a trim lasts no time hold shorter words alone: they are not halved."""
+    end = SE2.exp(time * np.array([-0.25, 0.0, 1.0])).pose
+    cost, horizon = Cost(effort=1.0, time=1.0), Horizon(max_trims=4)
+    problem = Problem(robot(TABLE_2), [0.0, 0.0, 0.0], end, cost=cost, horizon=horizon)
+    found = search_words(problem, problem.goals[0], upper_bound=2.0625 * time)
+    assert names(problem, found.solutions[0]) == ("acw",)
+    assert found.counts["steering_calls"] < 2500  # of 160 words; they were up to 10,459
+
+
 def test_climbing_words_end_at_the_altitude():
     problem = Problem(
         helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], horizon=Horizon(max_trims=4)
