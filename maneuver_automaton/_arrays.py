@@ -104,7 +104,7 @@ def _int(value: Any) -> int:
 
 def as_number(name: str, value: Any) -> float:
     """A number that is handed in, as Python's own, whatever type it is written in."""
-    return float(_read(name, value, "float"))
+    return float(value if value.__class__ is float else _read(name, value, "float"))
 
 
 def as_whole(name: str, value: Any) -> int:

@@ -52,11 +52,11 @@ class Cost:
     norm: float = 0.0  # c2
     time: float = 0.0  # c3 [1/s]
     effort_matrix: Array | None = field(default=None, compare=False)  # R (n_u, n_u), None: identity
-    norm_order: float = 2.0  # 1, 2 or inf
-    length: float = 0.0  # [1/m]
-    switch: float = 0.0  # per switch of trims
-    direction_change: float = 0.0  # per change between forward and reverse
-    _matrix: bytes = field(default=b"", init=False, repr=False)  # R, where equality is asked
+    norm_order: float = field(default=2.0, hash=False)  # 1, 2 or inf; hashes are asked for often
+    length: float = field(default=0.0, hash=False)  # [1/m]
+    switch: float = field(default=0.0, hash=False)  # per switch of trims
+    direction_change: float = field(default=0.0, hash=False)  # per change of forward and reverse
+    _matrix: bytes = field(default=b"", init=False, repr=False, hash=False)  # R, for equality
 
     __repr__ = brief
 

@@ -592,7 +592,7 @@ class Problem:
         """Invariant cost of trims that last `durations` (n,) [s], with the switches between."""
         if not trims:
             return 0.0
-        coasting = float(self.rates_of_trims(trims) @ durations)
+        coasting = float(self.rates_of_trims(trims).dot(durations))
         if not prices_switches(self.cost):
             return coasting
         return coasting + self.cost.switching(np.array([trim.body_velocity for trim in trims]))
@@ -825,9 +825,9 @@ def settled_state(
 
 def apart(one: Array, other: Array) -> tuple[float, float]:
     """How far two poses (dof,) are from each other: distance [m], and turn [rad] up to pi."""
-    places = slice(2) if one.size == 3 else [0, 1, *range(3, one.size)]
-    way = other[places] - one[places]
-    return math.sqrt(way.dot(way)), abs(math.remainder(float(other[2] - one[2]), 2.0 * math.pi))
+    off = other - one
+    way = off[:2] if off.size == 3 else off[[0, 1, *range(3, off.size)]]
+    return math.sqrt(way.dot(way)), abs(math.remainder(off.item(2), 2.0 * math.pi))
 
 
 def moves(obstacle: AnyObstacle) -> bool:

@@ -242,7 +242,7 @@ class Plan(Played):
     @cached_property
     def duration(self) -> float:
         """Time the plan takes [s], rest included."""
-        return float(np.add.reduce(self.primitive_durations))
+        return float(np.add.reduce(self.primitive_durations if self.maneuvers else self.durations))
 
     @cached_property
     def switching_times(self) -> Array:
@@ -326,8 +326,9 @@ class Plan(Played):
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at `time` (...,) [s]; held before the start and after the end."""
-        times = as_array("time", time, infinite=True)
-        if not self.primitives:
+        plain = isinstance(time, float) and abs(time) >= 0.0  # no NaN
+        times = np.asarray(time) if plain else as_array("time", time, infinite=True)
+        if not self.trims:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         if not (times.ndim or any(self.maneuvers)):  # one time, of trims alone: plain numbers
             time, durations = float(times), self.durations.tolist()
@@ -359,8 +360,7 @@ class Plan(Played):
         return np.asarray(controls[self._index_at(times)])
 
     def _index_at(self, times: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-        after = np.searchsorted(self.switching_times[1:-1], times, side="right")
-        return np.asarray(after, dtype=np.intp)
+        return np.searchsorted(self.switching_times[1:-1], times, side="right")
 
     def sample(self, *, max_step_m: float = 0.05, max_step_rad: float = 0.05) -> Trajectory:
         """Samples at every switching time and closer than both steps in between.

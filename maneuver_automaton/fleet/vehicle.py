@@ -453,7 +453,7 @@ class FleetMember:
         """Its problem where those that stay at their goals stand there already."""
         arrived = [
             one if one.motion is None else where_it_stays(one)
-            for one in sorted(others, key=lambda one: one.motion is not None)  # as in other queries
+            for one in others
             if one.motion is None or one.presence[1] == math.inf
         ]
         return replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
@@ -176,6 +177,7 @@ class LoopDocument(DocumentHead):
 def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
     """The content of closed_loop.json, as plain values; `name` is that of the scenario."""
     automaton, poses = loop.problem.automaton, loop.poses.tolist()
+    left = loop.value if math.isfinite(loop.value) else 0.0
     document = document_of(
         LoopDocument,
         loop,
@@ -204,12 +206,7 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
                 )
                 for step, pose in zip(loop.steps, poses, strict=False)
             ),
-            ended_entry(
-                loop.times[-1],
-                poses[-1],
-                loop.value if math.isfinite(loop.value) else 0.0,
-                loop.cost,
-            ),
+            ended_entry(loop.times[-1], poses[-1], left, loop.cost),
         ],
     )
     if not loop.problem.via:
@@ -248,8 +245,8 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
             plan = plan_of(row["pose"], float(row["time_s"]), row["plan"], automaton)
             decision = Decision(row.get("decision") or row["deed"])
             value = float(row["value"])  # of what is driven it is known
-            one = made(Step, row, AppliedEntry, plan=plan, decision=decision, value=value)
-            steps.append(one)
+            known = {"value": value, "bound": partial(float, row["lower_bound"])}
+            steps.append(made(Step, row, AppliedEntry, plan=plan, decision=decision, **known))
     return tuple(steps), poses
 
 

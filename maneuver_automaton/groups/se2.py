@@ -260,7 +260,7 @@ def end_of_coasting(start: Array, twists: Iterable[Array], durations: Iterable[f
     return np.array(pose)
 
 
-def seen_from(start: Array, pose: Array) -> Array:
+def seen_from(start: Array, pose: Array) -> list[float]:
     """A pose (dof,) seen from another: places are subtracted first, so that no digit is lost.
 
     To the last bit ``start.inverse() @ pose`` of poses that are moved to where `start` is 0.
@@ -269,21 +269,18 @@ def seen_from(start: Array, pose: Array) -> Array:
     x, y = there[0] - here[0], there[1] - here[1]
     c, s = math.cos(-here[2]), math.sin(-here[2])
     planar = [c * x - s * y, s * x + c * y, there[2] - here[2]]
-    return np.array(planar if len(here) == 3 else [*planar, there[3] - here[3]])
+    return planar if len(here) == 3 else [*planar, there[3] - here[3]]
 
 
 def _after(pose: list[float], twist: list[float], duration: float) -> list[float]:
     """Pose after a trim; the formula of `SE2.exp`, in the same order of operations."""
     x, y, turn = duration * twist[0], duration * twist[1], duration * twist[2]
     if turn:
-        ahead, aside = _sinc(turn / math.pi), math.sin(turn / 2) * _sinc(turn / (2 * math.pi))
+        # Twice `np.sinc`: where a share of a half turn is rounded to no angle at all, it is one.
+        whole, half = math.pi * (turn / math.pi), math.pi * (turn / (2 * math.pi))
+        ahead = math.sin(whole) / whole if whole else 1.0
+        aside = math.sin(turn / 2) * (math.sin(half) / half if half else 1.0)
         x, y = ahead * x - aside * y, aside * x + ahead * y
     c, s = math.cos(pose[2]), math.sin(pose[2])
     planar = [pose[0] + (c * x - s * y), pose[1] + (s * x + c * y), pose[2] + turn]
     return planar if len(pose) == 3 else [*planar, pose[3] + duration * twist[3]]
-
-
-def _sinc(share: float) -> float:
-    """What `np.sinc` comes to, of a share that is not zero."""
-    angle = math.pi * share
-    return math.sin(angle) / angle if angle else 1.0

@@ -163,8 +163,11 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
     pieces: list[TrackPiece] = []
     for plan in plans:
         for k, piece in enumerate(track_of_plan(plan).pieces):
-            if k == 0 and pieces and _goes_on(pieces[-1], piece):
-                one = pieces[-1]
+            one = pieces[-1] if k == 0 and pieces else piece
+            late = abs(one.time[-1] - piece.time[0]) > END_TOLERANCE * (1.0 + abs(one.time[-1]))
+            scale = 1.0 + float(np.abs(one.pose[-1]).max())
+            off = np.abs(one.pose[-1] - piece.pose[0]).max() > END_TOLERANCE * scale
+            if one is not piece and one.name == piece.name and not (late or off):
                 pieces[-1] = TrackPiece(
                     name=one.name,
                     twist=one.twist,
@@ -176,15 +179,6 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
             else:
                 pieces.append(piece)
     return Track(start, tuple(pieces))
-
-
-def _goes_on(one: TrackPiece, other: TrackPiece) -> bool:
-    scale = 1.0 + float(np.abs(one.pose[-1]).max())
-    return bool(
-        one.name == other.name
-        and abs(one.time[-1] - other.time[0]) <= END_TOLERANCE * (1.0 + abs(one.time[-1]))
-        and np.abs(one.pose[-1] - other.pose[0]).max() <= END_TOLERANCE * scale
-    )
 
 
 class _Samples(NamedTuple):

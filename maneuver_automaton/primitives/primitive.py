@@ -85,12 +85,14 @@ class Trim:
     control: Array  # (n_u,), the model's units
     reduced_state: Array = field(default_factory=lambda: np.zeros(0))  # (n_z,), the model's units
     max_duration: float = math.inf  # [s]
+    is_rest: bool = field(default=False, init=False, repr=False)  # its twist is zero
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         plain_numbers(self)
         freeze(self, "body_velocity", last=(2, 3, 4))
+        object.__setattr__(self, "is_rest", not any(self.body_velocity.ravel().tolist()))
         freeze(self, "control")
         freeze(self, "reduced_state")
         if not isinstance(self.name, str) or not self.name.strip():
@@ -114,11 +116,6 @@ class Trim:
             raise ValueError(
                 f"trim {self.name!r}: max_duration must be positive, got {self.max_duration} s"
             )
-
-    @property
-    def is_rest(self) -> bool:
-        """Whether the trim is a rest: zero twist."""
-        return not any(self.body_velocity.tolist())
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:
         """Poses after coasting from `start` for `duration` (...,) [s]."""

@@ -143,7 +143,7 @@ def candidate(
 
 def allowed(here: Problem, plan: Plan) -> bool:
     """Whether a plan stays inside the bounds, unless the vehicle is outside of them already."""
-    return bool(outside(here.start, here.bounds)) or stays_inside(plan, here.bounds)
+    return stays_inside(plan, here.bounds) or bool(outside(here.start, here.bounds))
 
 
 def bounded(problem: Problem) -> bool:
@@ -167,17 +167,16 @@ def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | Non
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
     """Whether the word of `plan` is the rest of the last one, with or without a rest to pad it."""
-    return rest is not None and (plan is rest or _moving(plan) == _moving(rest))
+    if rest is None or plan is rest:
+        return plan is rest
+    one, other = list(moving_pieces(plan)), list(moving_pieces(rest))
+    return one == other or [base_name(a.name) for a in one] == [base_name(b.name) for b in other]
 
 
 def within(pose: Array, goal: Goal) -> bool:
     """Whether a pose is a goal, to within its tolerances (1e-9 where they are 0)."""
     distance, turn = goal.off(pose)
     return distance <= goal.tolerance_m + EXACT and turn <= goal.tolerance_rad + EXACT
-
-
-def _moving(plan: Plan) -> list[str]:
-    return [base_name(piece.name) for piece in moving_pieces(plan)]
 
 
 MOST_STEPS = 4  # that a plan within the goal's set may take

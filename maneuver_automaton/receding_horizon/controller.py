@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +45,7 @@ from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.search.choose import load_search as load_words
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.limits import closed_bound
 
 MOST_AHEAD = 10_000  # steps ahead for which a plan gets samples; later steps see to theirs
 
@@ -179,7 +181,7 @@ class RecedingHorizon:
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
         expect_many_calls()
-        load_search(problem)
+        self.kind = load_search(problem)
         self.proven = None if settings.gap is None else LoopBounds.ready(settings.gap)
 
     def step(
@@ -228,7 +230,7 @@ class RecedingHorizon:
         names the motion that it drives instead.
         """
         dof = self.problem.automaton.model.group.dof
-        pose = np.array(as_array("measured_state", measured_state, last=dof))
+        pose = as_array("measured_state", measured_state, last=dof)
         if pose.shape != (dof,):
             raise ValueError(f"measured_state: got shape {pose.shape}, need ({dof},)")
         seen = self.problem.obstacles if obstacles is None else as_obstacles(obstacles)
@@ -236,7 +238,7 @@ class RecedingHorizon:
         if changed:
             self.problem = replace(self.problem, obstacles=seen)
             self.settings.check(self.problem)
-            load_search(self.problem)
+            self.kind = load_search(self.problem)
         budget = Budget.from_now(self.settings.time_limit)
         last = self.last
         elapsed = None if elapsed is None else as_number("elapsed", elapsed)
@@ -268,14 +270,11 @@ class RecedingHorizon:
             state=known if last is None else None,
         )
         # Limits that the vehicle breaks already are replaced by those that it keeps.
-        kind: type[StepSearch] = AmongObstacles if here.obstacles else InFreeSpace
         said = ""
-        if needs_maneuvers(here):
-            kind = OverManeuvers
-            if here.margin and here.obstacles and here.start.size == 3:
-                here, said = within_its_margin(here)
-        elif here.obstacles:
+        if self.kind is AmongObstacles:
             here, said = as_it_stands(here)
+        elif here.margin and here.obstacles and here.start.size == 3:
+            here, said = within_its_margin(here)
         now = Situation(
             self.settings, here, last, passed=driven, budget=budget, changed=changed, state=known
         )
@@ -283,8 +282,8 @@ class RecedingHorizon:
             now.flag(Guarantee.SAFETY, said)
         if self.proven is not None:
             now.bound = self._known(now)
-        search = kind(now)
-        step = self._logged(search.decide(), search, now)
+        search = self.kind(now)
+        step = self._logged(search.decide(), now)
         self.last = replace(step, passed=tuple(passed)) if passed else step
         control = self.last.control
         if control is None and self.settings.pad is not None:
@@ -311,7 +310,7 @@ class RecedingHorizon:
         spent = cost_until(self.problem, plan, passed)
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
-    def _logged(self, chosen: StepPlan, search: StepSearch, now: Situation) -> Step:
+    def _logged(self, chosen: StepPlan, now: Situation) -> Step:
         here, last, delta, plan = now.here, now.last, self.settings.step, chosen.plan
         if plan.maneuvers:
             most = min(plan.duration / delta, MOST_AHEAD)
@@ -319,16 +318,15 @@ class RecedingHorizon:
             plan = with_samples_at(plan, instants, here.automaton.model)
         same = is_rest_of(plan, now.rest)
         decision = _decision(chosen, now, same=same)
-        bound = self._bound(chosen, search, now)
-        value = chosen.cost if decision.leads else bound
+        bound = self._bound(chosen, now)
+        leads = decision.leads
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
-        whole = chosen.cost if plan is chosen.plan and decision.leads else None
+        whole = chosen.cost if plan is chosen.plan and leads else None
         step = Step(
             time=here.start_time,
-            pose=here.start,
             plan=plan,
             goal_index=chosen.goal_index,
-            value=value,
+            value=chosen.cost if leads else bound(),
             applied=applied,
             applied_cost=cost_until(here, plan, applied, whole=whole),
             accumulated_cost=now.accumulated,
@@ -336,7 +334,7 @@ class RecedingHorizon:
             replanned=last is not None and not same,
             shifted_value=chosen.shifted_value,
             off_plan=now.off_plan,
-            lower_bound=min(value, bound),
+            bound=bound,
             exhaustive=now.exhaustive,
             solve_s=now.budget.elapsed,
             number=0 if last is None else last.number + 1,
@@ -378,16 +376,19 @@ class RecedingHorizon:
         if steady and step.decision.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 
-    def _bound(self, chosen: StepPlan, search: StepSearch, now: Situation) -> float:
+    def _bound(self, chosen: StepPlan, now: Situation) -> Callable[[], float]:
         """No plan to any goal costs less."""
+        here, bound = now.here, self.promises.effort_bound
         if now.exhaustive:
-            return chosen.cost
+            return partial(float, chosen.cost)
         if self.settings.continuous:  # at another pace trims may cost less than the library's
-            return min(self.promises.effort_bound(now.here.start, goal) for goal in now.here.goals)
-        least, moving = search.lower_bound(), now.as_it_moves
+            return partial(float, min(bound(here.start, goal) for goal in here.goals))
+        least = partial(closed_bound, here, *here.goals) if self.kind.finds_words else float
+        moving = now.as_it_moves
         if self.proven is None or moving is None:
             return least
-        return max(least, self.proven.prove(moving, chosen.cost, now.accumulated, now.budget))
+        proven = self.proven.prove(moving, chosen.cost, now.accumulated, now.budget)
+        return partial(max, least(), proven)
 
 
 def _is_taken(violation: Violation, now: Situation) -> bool:
@@ -409,8 +410,8 @@ def _decision(chosen: StepPlan, now: Situation, *, same: bool) -> Decision:
     return Decision.IMPROVED if same and now.last.decision.leads else Decision.REPLANNED
 
 
-def load_search(problem: Problem) -> None:
-    """Prepare the search of a step for a problem, before its clock runs."""
+def load_search(problem: Problem) -> type[StepSearch]:
+    """The search of a step for a problem, prepared before the step's clock runs."""
     load_kernels("times")
     if needs_maneuvers(problem):
         load_kernels("words", "linked words")
@@ -418,11 +419,13 @@ def load_search(problem: Problem) -> None:
             load_kernels("lattice", "improvement")
         if problem.moves:
             load_kernels("lattice", "fail-safe")
-    elif problem.obstacles:
+        return OverManeuvers
+    if problem.obstacles:
         load_kernels("lattice", "improvement", "fail-safe")
         cost_to_go_table(problem)
-    else:
-        load_words(problem)
+        return AmongObstacles
+    load_words(problem)
+    return InFreeSpace
 
 
 ManeuverHorizon = RecedingHorizon  # the name it has had for vehicles with inertia

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,7 +71,7 @@ class Decision(enum.Enum):
     @property
     def leads(self) -> bool:
         """Whether the step's plan ends at the goal."""
-        return self in (Decision.PLANNED, Decision.KEPT, Decision.IMPROVED, Decision.REPLANNED)
+        return self._name_ in ("PLANNED", "KEPT", "IMPROVED", "REPLANNED")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,7 +79,6 @@ class Step:
     """One step: the pose of the vehicle, the plan from there, and the piece that is applied."""
 
     time: float  # [s]
-    pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
     plan: Plan  # from `pose` to the goal, or, if its decision does not lead there, fail-safe
     goal_index: int  # which of the problem's goals it reaches
     value: float  # cost of the whole plan; of one that does not lead to the goal, a lower bound
@@ -90,7 +89,7 @@ class Step:
     replanned: bool  # the word is not the rest of the previous one
     shifted_value: float | None  # cost of the rest of the last plan, None if it has none here
     off_plan: float | None  # [m or rad] between `pose` and the prediction of the last plan
-    lower_bound: float
+    bound: Callable[[], float]  # no plan costs less: worked out when it is asked for
     exhaustive: bool  # no admitted word is cheaper
     solve_s: float
     number: int  # 0 for the first
@@ -106,8 +105,15 @@ class Step:
 
     __repr__ = brief
 
-    def __post_init__(self) -> None:
-        freeze(self, "pose", last=(3, 4))
+    @property
+    def pose(self) -> Array:
+        """Pose (dof,) of the vehicle, where the plan starts [m, m, rad(, m)]."""
+        return self.plan.start
+
+    @property
+    def lower_bound(self) -> float:
+        """No plan costs less, as far as is known."""
+        return min(self.value, self.bound())
 
     @property
     def control(self) -> Array | None:

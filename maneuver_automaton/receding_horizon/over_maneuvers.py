@@ -50,6 +50,8 @@ HALVINGS = 10  # of a plan's duration, to find out when it is hit
 class OverManeuvers(StepSearch):
     """Words of trims and maneuvers, then their lattice, checked by FCL."""
 
+    finds_words = False
+
     def __init__(self, now: Situation) -> None:
         super().__init__(now)
         self.anew = now.here.moves or now.changed  # obstacles are not where they were
@@ -295,10 +297,6 @@ class OverManeuvers(StepSearch):
         return Mitigation(
             plan=plan, contact=plan.start_time + free, clearance=math.inf, reason=reason
         )
-
-    def lower_bound(self) -> float:
-        """None is known of plans that need not be words of the library."""
-        return 0.0
 
 
 def needs_maneuvers(problem: Problem) -> bool:

@@ -84,15 +84,16 @@ def without_nothing(plan: Plan) -> Plan:
 
 def moving_pieces(plan: Plan) -> Iterator[Primitive]:
     """The trims and maneuvers of a plan that last, without those that stand still."""
-    durations: list[float] = plan.primitive_durations.tolist()
-    for piece, duration in zip(plan.primitives, durations, strict=True):
+    pieces: tuple[Primitive, ...] = plan.primitives if plan.maneuvers else plan.trims
+    times = plan.primitive_durations if plan.maneuvers else plan.durations
+    for piece, duration in zip(pieces, times.tolist(), strict=True):
         if isinstance(piece, Maneuver) or (duration > NOTHING and not piece.is_rest):
             yield piece
 
 
 def moves_on(plan: Plan) -> bool:
     """Whether a plan is more than to stand still."""
-    return any(True for _ in moving_pieces(plan))
+    return next(moving_pieces(plan), None) is not None
 
 
 def merged(

@@ -88,6 +88,7 @@ class Situation:
         self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
         self.off_state = False  # whether another reduced state was measured than the plan says
         self.size = 1.0 + max(map(abs, here.start.tolist()))  # [m or rad] rounding grows with it
+        self.off = [goal.off(here.start) for goal in here.goals]  # how far it is off every goal
         self.accumulated = 0.0 if last is None else last.accumulated_cost + last.applied_cost
         if last is not None:
             off = max(apart(last.plan.pose_at(last.time + passed), here.start))
@@ -182,7 +183,7 @@ class Situation:
         """The committed part, then `plan`, which starts at its end."""
         return plan if self.head is None else joined(self.head, plan)
 
-    @cached_property
+    @property
     def is_over(self) -> bool:
         """Whether nothing of the last plan is left but to stand still."""
         return self.rest is not None and not moves_on(self.rest)
@@ -238,7 +239,7 @@ class Situation:
             plan = self.rest
         elif total is not None and pad is not None:
             plan = rested(plan, pad, total)
-        elif pad is not None and max(here.goals[index].off(here.start)) > EXACT:
+        elif pad is not None and max(self.off[index]) > EXACT:
             plan = rested(plan, pad, self.settings.step)
         value = here.cost_of(plan)
         shifted = None if self.rest is None else min(value, here.cost_of(self.rest))

@@ -30,7 +30,6 @@ from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin,
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.search.limits import closed_bound
 
 LEAST_AHEAD = 1e-9  # [s] that a fail-safe trajectory covers at least
 LATE = 0.8  # share of a step's time after which no path to the goal is searched
@@ -46,6 +45,7 @@ class StepSearch:
     """
 
     improves = False  # whether it starts from the plan that is kept, so that any safe one will do
+    finds_words = True  # of the library: of others no bound is known in closed form
 
     def __init__(self, now: Situation) -> None:
         self.now = now
@@ -100,10 +100,6 @@ class StepSearch:
     def mitigation(self) -> Mitigation:
         """The motion that collides last, where none is safe."""
         return mitigate(self.here, step=self.settings.step, until=self.until, known=self.tried)
-
-    def lower_bound(self) -> float:
-        """No plan to any goal costs less."""
-        return min(closed_bound(self.here, goal) for goal in self.here.goals)
 
     def planned_anew(
         self, share: float = 1.0, *, improve: bool = True, then: Plan | None = None
@@ -221,8 +217,7 @@ class StepSearch:
         if here.via:
             return None
         goals = here.goals if now.may_rest else ()
-        off = [goal.off(here.start) for goal in goals]
-        index = next((n for n, one in enumerate(off) if max(one) <= EXACT), None)
+        index = next((n for n in range(len(goals)) if max(now.off[n]) <= EXACT), None)
         if index is None and now.settings.hold:
             index = next((n for n, goal in enumerate(goals) if within(here.start, goal)), None)
             held = None if index is None else holding(here, now.settings, index)
@@ -230,7 +225,7 @@ class StepSearch:
                 return replace(held, shifted_value=held.cost, arrived=True)
         if index is None and now.last is not None:
             before = now.last.goal_index
-            index = before if within(here.start, here.goals[before]) and now.is_over else None
+            index = before if now.is_over and within(here.start, here.goals[before]) else None
         if index is None:
             return None
         there = now.resting(index)

@@ -79,7 +79,7 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     latest = math.inf if most_time is None else most_time + LATE
     found.add(_in_time(free, latest))
     yield found.result()
-    late = not free.solutions or free.solutions[0].duration > latest
+    late = most_time and (not free.solutions or free.solutions[0].duration > latest)
     if most_time is not None and late and not task.budget.is_over:
         library = work.library.within_time(most_time)
         found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), latest))
@@ -88,8 +88,8 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
 
 def _in_time(found: SearchResult, latest: float) -> SearchResult:
     """The solutions that end in time."""
-    kept = tuple(one for one in found.solutions if one.duration <= latest)
-    return replace(found, solutions=kept)
+    kept = [one for one in found.solutions if latest == math.inf or one.duration <= latest]
+    return found if len(kept) == len(found.solutions) else replace(found, solutions=tuple(kept))
 
 
 def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
@@ -126,10 +126,11 @@ def _improved(work: _Insertion) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     names = [] if plan is None else [trim.name for trim in plan.trims]
-    if plan is not None and len(names) <= LONGEST and all(name in automaton for name in names):
-        word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
-        if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
-            known.append(_in_library(work, word, plan.durations))
+    if plan is not None and len(names) <= LONGEST and all(map(automaton.__contains__, names)):
+        numbers = np.array(list(map(automaton.index_of, names)), dtype=np.int64)
+        word = _in_library(work, numbers, plan.durations)
+        if min(word.trims, default=0) >= 0:  # its trims are those of the library
+            known.append(word)
     if work.seeds == 0:
         found = _improved_from(work, known)
         if found.solutions:
@@ -285,10 +286,11 @@ def _solutions(work: _Insertion, word: TimedWord) -> Iterator[Word]:
     times = library.corrected(numbers, word.durations, work.exact)
     if times is None:
         return
-    cost = word.cost + float(library.problem.rates[numbers] @ (times - word.durations))
+    cost = word.cost + float(library.problem.rates[numbers].dot(times - word.durations))
     kept = slice(0, numbers.size - library.tail)
     trims, lasting = library.trims[numbers[kept]], times[kept]
-    if (used := trims != UNUSED).sum() < trims.size:  # neighbours that unused time parts are one
+    if UNUSED in trims.tolist():  # neighbours that unused time parts are one
+        used = trims != UNUSED
         trims, lasting = normal_form(trims[used], lasting[used], shortest=-math.inf)
     switching = problem.cost.switching(problem.automaton.body_velocities[trims])
     yield Word(
@@ -343,9 +345,7 @@ def _in_library(work: _Insertion, trims: IntArray, durations: Array) -> TimedWor
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
     if library.tail:
-        turned = float(
-            library.problem.twists[word, 2] @ np.array(times)
-        )  # the rest is turned at 1 rad/s
+        turned = float(library.problem.twists[word, 2] @ np.array(times))  # the rest: at 1 rad/s
         word.append(len(library.problem.rates) - 1)
         times.append(float(np.remainder(library.problem.goal[2] - turned, 2.0 * np.pi)))
     return TimedWord(tuple(word), np.array(times))

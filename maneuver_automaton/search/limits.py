@@ -16,7 +16,7 @@ from maneuver_automaton.groups import group_of
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.search.setup import SearchSetup, goal_from_start, is_still, search_setup
-from maneuver_automaton.words.library import moving_trims
+from maneuver_automaton.words.library import MovingTrims, moving_trims
 from maneuver_automaton.words.shortest import least_radius, reeds_shepp_length, shortest_paths
 from maneuver_automaton.words.word import Word
 
@@ -97,8 +97,8 @@ def _misses(directions: Array, goal: Array) -> bool:
     return bool(backwards or np.abs(gap).max() > slack)
 
 
-def closed_bound(problem: Problem, goal: Goal) -> float:
-    """No plan that ends within the tolerance of `goal` is cheaper, whatever its word.
+def closed_bound(problem: Problem, *goals: Goal) -> float:
+    """No plan that ends within the tolerance of one of `goals` is cheaper, whatever its word.
 
     The largest of: the distance at the best price per metre, and the shortest path of a car at it;
     the turn at the best price per radian; a fixed time at the best price per second, and, for a
@@ -108,7 +108,7 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
 
     Source: the paper, Appendix; Cauchy-Schwarz.
     """
-    return max(closed_bounds(problem, goal).values())
+    return min(max(closed_bounds(problem, goal).values()) for goal in goals)
 
 
 def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
@@ -116,7 +116,7 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     limit, library = problem.horizon.time, moving_trims(problem.automaton, problem.cost)
     relative = goal_from_start(problem, goal)
     pads = limit is not None and library.rest is not None
-    prices = _prices(problem.automaton, problem.cost, pads) if len(library.rates) else None
+    prices = _prices(library, pads) if len(library.rates) else None
     if prices is None or is_still(relative, free_heading=goal.free_heading):
         return {"distance": 0.0}
     distance, turn = _distance_to(relative, goal), _turn_to(relative, goal)
@@ -129,7 +129,7 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
         "distance": max((way * price for way, price in ways if way > 0.0), default=0.0),
         "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
     }
-    radius = prices.least_radius
+    radius = prices.least_radius if problem.automaton.is_kinematic else 0.0
     if radius > 0.0 and not (goal.free_heading or goal.tolerance_m or goal.tolerance_rad):
         length = float(reeds_shepp_length(relative[:3], radius=radius))
         bounds["shortest"] = length * (1.0 - ALIKE) * prices.per_metre_level
@@ -143,20 +143,20 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     return {what: padded + bound for what, bound in bounds.items()}
 
 
-def sole_bound(problem: Problem, goal: Goal) -> float:
+def sole_bound(problem: Problem, goal: Goal, off: tuple[float, float]) -> float:
     """Cost of the only cheapest plan to a goal, if there is one that costs no more; else 0 or less.
 
-    The distance at the best price per metre, or the turn at the best price per radian, where one
-    trim alone has that price. A plan that costs no more drives straight to the goal, or turns on
-    the spot, and uses no other trim; so none is cheaper, and no other as cheap.
+    Of what it is `off`, the distance at the best price per metre or the turn at that per radian,
+    where one trim alone has that price. A plan that costs no more drives straight to the goal, or
+    turns on the spot, and uses no other trim; so none is cheaper, and no other as cheap.
     """
     limit, library = problem.horizon.time, moving_trims(problem.automaton, problem.cost)
     pads = limit is not None and library.rest is not None
     exact = goal.tolerance_m == goal.tolerance_rad == 0.0
-    prices = _prices(problem.automaton, problem.cost, pads) if exact else None
+    prices = _prices(library, pads) if exact else None
     if prices is None or (limit is not None and not pads) or prices_switches(problem.cost):
         return 0.0
-    distance, turn = goal.off(problem.start)
+    distance, turn = off
     bound = max(
         distance * prices.per_metre if prices.one_per_metre else 0.0,
         turn * prices.per_radian if prices.one_per_radian else 0.0,
@@ -167,7 +167,7 @@ def sole_bound(problem: Problem, goal: Goal) -> float:
 def busy_bound(problem: Problem, at_rest: float) -> float:
     """Cost of plans that rest less than `at_rest` [s] of a fixed time, at least; inf if free."""
     library, limit = moving_trims(problem.automaton, problem.cost), problem.horizon.time
-    prices = _prices(problem.automaton, problem.cost, True)
+    prices = _prices(library, True)
     if limit is None or library.rest is None or library.rest_rate or prices is None:
         return math.inf if limit is None else 0.0
     return prices.per_second * (limit - at_rest)
@@ -269,9 +269,8 @@ class _LeastPrices:
 
 
 @kept_by_first
-def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _LeastPrices | None:
+def _prices(library: MovingTrims, pads: bool) -> _LeastPrices | None:
     """None where a trim is cheaper than the rest that pads."""
-    library = moving_trims(automaton, cost)
     rates = library.rates - (library.rest_rate if pads else 0.0)
     if (rates < 0.0).any():
         return None
@@ -291,7 +290,7 @@ def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _LeastPrices |
             per_square=float(np.min(rates / squares)),
             one_per_metre=_is_alone(metre),
             one_per_radian=_is_alone(radian),
-            least_radius=least_radius(library.twists) if automaton.is_kinematic else 0.0,
+            least_radius=least_radius(library.twists),
         )
 
 

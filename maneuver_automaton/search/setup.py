@@ -75,8 +75,7 @@ def is_still(goal: Array, *, free_heading: bool) -> bool:
 
 def goal_from_start(problem: Problem, goal: Goal) -> Array:
     """The goal (4,) seen from the problem's start, at an altitude of zero in the plane."""
-    relative = np.zeros(4)
-    relative[: problem.start.size] = seen_from(problem.start, goal.pose)
+    relative = np.array([*seen_from(problem.start, goal.pose), 0.0][:4])
     relative.setflags(write=False)
     return relative
 
@@ -131,7 +130,8 @@ class Columns:
     trims: IntArray  # (M,) their indices in the automaton, -1 for the free turn
     twists: Array  # (M, 4)
     rates: Array  # (M,) that of rest taken off where it pads
-    weights: Array  # (M,) 0 for the free turn, which takes no time, otherwise 1
+    rows: Array  # (2, M) altitude and time that a second of each adds up to
+    weights: Array  # (M,) the second one: 0 for the free turn, which takes no time, otherwise 1
     number_of: IntArray  # (m,) of the automaton's trims their row here, -1 where there is none
     scale: float  # size of a typical rate
 
@@ -156,6 +156,7 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         trims=trims,
         twists=np.array(twists, order="C"),
         rates=np.array(rates),
+        rows=np.array([twists[:, 3], weights]),
         weights=weights,
         number_of=number_of,
         scale=float(np.abs(rates).max(initial=1.0)),
@@ -213,9 +214,9 @@ class InsertionLibrary:
         end = start, known.twists[word], float(goal[2]), np.zeros(4), False
         rows, targets = known.rows[first:].take(word, axis=1), known.targets[first:]
         best, missing = close_times(*end, rows, targets, np.array(times), RANK, -math.inf)
-        if not missing < MET or (best < -MET).any():
+        if not missing < MET or min(best.tolist(), default=0.0) < -MET:
             return None
-        return np.asarray(best.clip(min=0.0))
+        return np.maximum(best, 0.0)
 
 
 def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
@@ -223,17 +224,17 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
     limit, library = problem.horizon.time, setup.library
     pads = limit is not None and library.rest is not None
     kept = columns(library, pads=pads, free_heading=setup.free_heading)
-    met = [(kept.twists[:, 3], setup.goal[3])] if setup.climbs else []
-    met += [] if limit is None else [(kept.weights, limit)]
+    met = [float(setup.goal[3])] if setup.climbs else []
+    met += [] if limit is None else [limit]
     return InsertionLibrary(
         trims=kept.trims,
         number_of=kept.number_of,
         problem=TimesProblem(
             twists=kept.twists,
             rates=kept.rates,
-            rows=np.array([row for row, _ in met]).reshape(len(met), len(kept.rates)),
+            rows=kept.rows[int(not setup.climbs) : 2 - int(limit is None)],
             goal=np.array(setup.goal),
-            targets=np.array([target for _, target in met], dtype=np.float64),
+            targets=np.array(met, dtype=np.float64),
         ),
         rest=len(library.trims) if pads else None,
         tail=int(setup.free_heading),

@@ -91,7 +91,7 @@ def search_words(
     job = scan_of(problem, setup, Extent(most=most, alternatives=alternatives, nodes=nodes))
     job.begin(setup, upper_bound=upper_bound, not_first=not_first)
     finished = job.run(budget, problem.search.max_expansions)
-    solutions = tuple(in_order(_handed_over(job, budget)))
+    solutions = tuple(in_order(_handed_over(job, budget))) if job.n_found else ()
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]
         most_tied = tied(asked[-1].cost) if ties else -math.inf

@@ -142,7 +142,7 @@ def plan_of(
     Without a goal the times are taken as they are. Beside maneuvers, trims at its ends that last no
     time are left out: a file of the plan does not hold them.
     """
-    trims = [automaton.trims[k] for k in word.trims.tolist()]
+    trims = tuple(automaton.trims[k] for k in word.trims.tolist())
     durations = word.durations
     if goal is not None:
         twists = np.array([trim.body_velocity for trim in trims]).reshape(-1, start.size)
@@ -156,7 +156,7 @@ def plan_of(
         )
     maneuvers = [None if k == SWITCH else automaton.maneuvers[k] for k in word.transitions.tolist()]
     if not any(maneuvers):
-        return Plan.of_parts(start, tuple(trims), durations.tolist(), start_time=start_time)
+        return Plan.of_parts(start, trims, durations.tolist(), start_time=start_time)
     a, b = 0, len(trims)
     while maneuvers[a] is None and durations[a] == 0.0:
         a += 1

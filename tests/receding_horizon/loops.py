@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,6 @@ def made_up(problem: Problem, **changed) -> Step:
     """A step that never was: ahead for a second, in a loop that closes every half second."""
     values = {
         "time": 0.0,
-        "pose": problem.start,
         "plan": Plan(problem.start, (problem.automaton.trims[1],), durations=[1.0]),
         "goal_index": 0,
         "value": 1.0,
@@ -59,7 +59,7 @@ def made_up(problem: Problem, **changed) -> Step:
         "replanned": False,
         "shifted_value": 1.0,
         "off_plan": 0.0,
-        "lower_bound": 0.0,
+        "bound": partial(float, 0.0),
         "exhaustive": False,
         "solve_s": 0.0,
         "number": 0,
