@@ -94,7 +94,6 @@ class Nodes(NamedTuple):
     """Room to look at a word with one free time, at N + 1 nodes of it at most, on both branches."""
 
     live: NDArray[np.bool_]  # (2, N) cells between nodes that may be cheap enough
-    unused: IntArray  # (2, N + 1) a bit for each trim of the triple that lasts no time
     stretches: IntArray  # (40, 2) of cells that are looked at next
     times: Array  # (2, N + 1, 4) of its trims
     values: Array  # (2, N + 1) of what is to vanish, NaN where there is none

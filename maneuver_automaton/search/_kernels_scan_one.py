@@ -117,7 +117,6 @@ def solve_nodes(
             if math.isnan(value):
                 continue
             assign(room.times[branch, j], times)
-            room.unused[branch, j] = unused_trims(problem, four, times)
             if m > 0:
                 value = condition(problem, four.word, four.n, m - 1, times)
                 if j > 0 and not math.isnan(values[branch, j - 1]):  # continuous from node to node
@@ -175,12 +174,6 @@ def first_interval(
     assign(high, room.times[branch, j + 1])
     low[four.q], high[four.q] = reach * j / nodes, reach * (j + 1) / nodes
     numbers[0], numbers[1], numbers[2], numbers[3] = values[j], values[j + 1], bend, 0.0
-    if pruned:
-        # A trim that lasts no time at both ends does not in between, where that is no chance: what
-        # there is to find is a shorter word, and the gradient is nothing but rounding.
-        one = room.unused[branch, j if at_low else j + 1]
-        if one & room.unused[branch, j + 1 if at_high else j]:
-            return False
     here, beyond = (j, j + 1) if at_low else (j + 1, j)
     if not (at_low and at_high):  # both branches end in between, where they meet
         if math.isnan(room.ends[j]):
@@ -189,6 +182,14 @@ def first_interval(
         edge = high if beyond > here else low
         edge[four.q] = room.ends[j]
         numbers[beyond - j] = evaluate(problem, candidates, four, edge, branch)
+    if pruned:
+        # A trim that lasts no time at both ends and halfway lasts none in between, as the branch is
+        # analytic: what there is to find is a shorter word, and the gradient nothing but rounding.
+        unused = unused_trims(problem, four, low) & unused_trims(problem, four, high)
+        middle = room.work[0]
+        middle[four.q] = 0.5 * (low[four.q] + high[four.q])
+        if unused and not math.isnan(evaluate(problem, candidates, four, middle, branch)):
+            return not unused & unused_trims(problem, four, middle)
     return True
 
 

@@ -351,11 +351,10 @@ class WordScan:
 def _room(most: int) -> Nodes:
     """Room for the nodes of a word's free time."""
     n = max(most, LEAST_NODES)
-    live, unused = np.empty((2, n), dtype=np.bool_), np.empty((2, n + 1), dtype=np.int64)
     nodes = (2, n + 1, 4), (2, n + 1), (2, n + 1), (n,)
     others = (3, 24, 4), (2, 3), (4, 4), (4, 3), (3, 4), (2, 2)
-    stretches = np.empty((40, 2), dtype=np.int64)
-    return Nodes(live, unused, stretches, *[np.empty(shape) for shape in (*nodes, *others)])
+    live, stretches = np.empty((2, n), dtype=np.bool_), np.empty((40, 2), dtype=np.int64)
+    return Nodes(live, stretches, *[np.empty(shape) for shape in (*nodes, *others)])
 
 
 @kept_by_first
