@@ -140,8 +140,11 @@ def word_extra(problem: WordProblem, word: IntArray, n: int) -> float:
 def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
     """Price of the switches of a word.
 
-    A problem with transitions has none: a conjugated twist has no gear.
+    A problem with transitions has none: a conjugated twist has no gear. The turn of a free heading
+    is no trim to switch to.
     """
+    if n > 1 and problem.trims.weights[word[n - 1]] == 0.0:
+        n -= 1
     price = problem.terms.switch * (n - 1)
     if problem.terms.direction_change > 0.0:
         sign = 0.0

@@ -11,7 +11,7 @@ import pytest
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
-from maneuver_automaton.problem import Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.words import search_words
 from tests.reference import Word, words_of
@@ -178,6 +178,16 @@ def test_the_pruned_search_is_the_head_of_the_complete_list(controls, alternativ
     assert_same_solutions(pruned, head)
 
 
+@pytest.mark.parametrize("switch", [0.3, 1.0, 2.9])
+@pytest.mark.parametrize("at", [(0.8, 1.1), (-0.4, 0.8), (-3.9, 2.7)])
+def test_the_turn_of_a_free_heading_is_no_switch(at, switch):
+    cost = Cost(effort=1.0, time=0.1, switch=switch)
+    problem = parking(TABLE_2, cost=cost, time=None, max_trims=3)
+    problem = replace(problem, goals=(Goal([*at, 0.0], free_heading=True),))
+    complete = search(problem, alternatives=None)
+    assert search(problem).solutions[0].cost == pytest.approx(complete.solutions[0].cost)
+
+
 def test_ties_go_to_fewer_trims_then_to_the_smaller_word():
     twins = robot({"b": (0.0, 1.0), "a": (1.0, 0.0), "c": (0.0, -1.0)})
     problem = Problem(twins, [0, 0, 0], [-1.0, 0.0, np.pi], horizon=Horizon(max_trims=3))
@@ -273,9 +283,6 @@ def test_a_full_circle_is_found_as_an_alternative():
     assert found == pytest.approx([0.5, 0.5 + 2.0 * np.pi])
 
 
-# Climbing.
-
-
 @compiled_only
 @pytest.mark.parametrize("time", [0.5, 1.0, 1.74230814])
 def test_a_word_of_one_trim_is_not_looked_for_among_longer_words(time):
@@ -285,9 +292,13 @@ def test_a_word_of_one_trim_is_not_looked_for_among_longer_words(time):
     problem = Problem(robot(TABLE_2), [0.0, 0.0, 0.0], end, cost=cost, horizon=horizon)
     found = search_words(problem, problem.goals[0], upper_bound=2.0625 * time)
     assert names(problem, found.solutions[0]) == ("acw",)
-    assert found.counts["steering_calls"] < 2500  # of 160 words; they were up to 10,459
+    assert found.counts["steering_calls"] < 4000  # of 160 words; they were 4,797 to 10,459
 
 
+# Climbing.
+
+
+@compiled_only
 def test_climbing_words_end_at_the_altitude():
     problem = Problem(
         helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], horizon=Horizon(max_trims=4)
