@@ -27,7 +27,8 @@ def open_input(path: Path) -> BinaryIO:
 def write_bytes_atomically(path: Path, content: bytes) -> None:
     """Replace the file `path` by `content` in one step; missing folders are made.
 
-    A reader sees the old file or the new one, never a part; on failure the old one stays.
+    A reader sees the old file or the new one, never a part; on failure the old one stays. A device
+    or a pipe is written to, not replaced.
     """
     target = path.resolve()  # a link keeps pointing where it points
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -37,6 +38,9 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
                 part.unlink()
     beside = target.parent / f"{PART}{uuid.uuid4().hex}"
     try:
+        if target.exists() and not target.is_file():
+            target.write_bytes(content)
+            return
         with beside.open("xb") as stream:
             stream.write(content)
             stream.flush()

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import FEW
 
 FARTHEST = 1e10  # [m] of a coordinate or a size, and of any other number of a file
-SMALLEST = 1e-100  # of any number of a file but 0: smaller ones have no squares nor quotients
 FASTEST = 5e3  # [m/s] of a trim, and of an obstacle that moves
 FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
 FASTEST_SPIN = 1e3  # [rad/s] of a trim, which a plan may hold for long

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,16 @@ def test_a_link_stays_a_link(tmp_path):
     write_text_atomically(link, "new")
     assert link.is_symlink()
     assert path.read_text() == "new"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_a_pipe_stays_a_pipe(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "plan.json").symlink_to("pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_text_atomically(tmp_path / "plan.json", "{}")
+    assert os.read(reader, 8) == b"{}"
+    os.close(reader)
 
 
 def test_a_name_that_is_not_utf_8_is_spelled_out():

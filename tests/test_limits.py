@@ -121,17 +121,8 @@ def test_a_library_of_maneuvers_without_number_is_refused(monkeypatch):
     ("start", "obstacle", "says"),
     [
         ("1e200", "{disc_m: {center: [3, 3], radius: 0.5}}", "1e\\+200"),
-        (
-            "0.0",
-            "{disc_m: {center: [1e12, 3], radius: 0.5}}",
-            "need 0 or a number of 1e-100 to 1e\\+10",
-        ),
-        (
-            "0.0",
-            "{disc_m: {center: [3, 3], radius: 1e15}}",
-            "need 0 or a number of 1e-100 to 1e\\+10",
-        ),
-        ("5e-324", "{disc_m: {center: [3, 3], radius: 0.5}}", "got 5e-324, need 0 or a number of"),
+        ("0.0", "{disc_m: {center: [1e12, 3], radius: 0.5}}", "need a number of at most 1e\\+10"),
+        ("0.0", "{disc_m: {center: [3, 3], radius: 1e15}}", "need a number of at most 1e\\+10"),
         (
             "0.0",
             "{disc_m: {center: [0, 0], radius: 0.5}, motion: [[0, 0, 5, 0], [0.001, 9, 5, 0]]}",

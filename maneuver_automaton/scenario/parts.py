@@ -29,7 +29,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from maneuver_automaton._limits import FARTHEST, SMALLEST
+from maneuver_automaton._limits import FARTHEST
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 
@@ -111,8 +111,7 @@ def holding(holds: Callable[[Any], bool], text: str) -> AfterValidator:
 
 
 _Small = holding(
-    lambda value: value == 0.0 or not (abs(value) > FARTHEST or abs(value) < SMALLEST),
-    f"0 or a number of {SMALLEST:g} to {FARTHEST:g} in size",
+    lambda value: not abs(value) > FARTHEST, f"a number of at most {FARTHEST:g} in size"
 )
 Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number"), _Small]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number"), _Small]
