@@ -62,6 +62,7 @@ def scan_one(
     if not reach > 0.0:
         return
     nodes = max(LEAST_NODES, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
+    nodes = min(nodes, room.ends.size)  # not one more by rounding
     # cells between nodes in which a branch may be cheap enough: the others have no solution that
     # counts, and most words have none of these
     live, four = room.live[:, :nodes], FreeTime(word, n, triple, q)
@@ -180,6 +181,7 @@ def first_interval(
             between = reach * here / nodes, reach * beyond / nodes
             room.ends[j] = end_of_branches(problem, candidates, four, between, branch)
         edge = high if beyond > here else low
+        edge[:] = 0.0
         edge[four.q] = room.ends[j]
         numbers[beyond - j] = evaluate(problem, candidates, four, edge, branch)
     if pruned:
