@@ -85,11 +85,10 @@ def obstacle_skin(obstacles: tuple[AnyObstacle, ...], *, excess: float) -> tuple
     fours = {k: o.corners for k, o in kinds.polygons if len(o.corners) == 4 and o.is_plain}
     corners = [box_corners(kinds.centers, kinds.headings, kinds.sizes)] if kinds.boxes else []
     corners += [one[None] for one in fours.values()]
-    parts = [_on_quads(np.concatenate(corners))] if corners else []
-    counts = [len(QUAD)] * (len(kinds.boxes) + len(fours))
+    quads = [_on_quads(np.concatenate(corners))] if corners else []
     others = {k: one for k, one in kinds.polygons if k not in fours}
     numbers = [*kinds.boxes, *fours, *others, *(k for k, _ in (*kinds.discs, *kinds.maps))]
-    parts += _on_polygons(list(others.values()))
+    parts = list(_on_polygons(list(others.values())))  # one for each of the rest
     for _, disc in kinds.discs:
         ring = circumscribed(disc.center, disc.radius, excess)
         first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
@@ -99,9 +98,9 @@ def obstacle_skin(obstacles: tuple[AnyObstacle, ...], *, excess: float) -> tuple
         rectangles = blocked_rectangles(one.blocked).astype(np.float64)
         rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
         parts.append(_on_quads(SE2(one.origin).act(rings)))
-    counts += [len(one.triangles) for one in parts[len(parts) - len(numbers) + len(counts) :]]
+    counts = [len(QUAD)] * (len(kinds.boxes) + len(fours)) + [len(one.triangles) for one in parts]
     owners = np.repeat(numbers, counts)
-    whole, order = _together(parts), np.argsort(owners, kind="stable")
+    whole, order = _together([*quads, *parts]), np.argsort(owners, kind="stable")
     return Skin(whole.vertices, whole.triangles[order]), owners[order]
 
 
