@@ -253,7 +253,6 @@ ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "max_work": (lambda v: ma.lower_bound(FREE, max_work=v, gap=1).value, 100),
     "step": (lambda v: ma.simulate(FREE, step=v, steps=2).cost, 1),
     "steps": (lambda v: ma.simulate(FREE, step=1, steps=v).cost, 2),
-    "applied": (lambda v: analysis.discrete_index([1, 1.5, 1.7, 1.8], applied=v), 1),
     "within": (lambda v: ma.design_library(FREE.automaton, within=v).factor, 1),
     "most": (lambda v: ma.design_library(FREE.automaton, most=v).factor, 9),
     "max_step_m": (lambda v: len(PLAN.sample(max_step_m=v).time), 1 / 2),

@@ -47,7 +47,6 @@ class GrowthBound:
     bounds: Array  # (n,) B [s], rises
     worst: Array  # (n, 3) pose seen from the goal that asks for it
     samples: int  # poses tried
-    sampled: bool = True  # whether it rests on samples; False only for a bound proven otherwise
 
     def __post_init__(self) -> None:
         for name in ("times", "bounds"):
@@ -55,8 +54,8 @@ class GrowthBound:
         freeze(self, "worst", last=3)
 
     def __repr__(self) -> str:
-        how = f"sampled at {self.samples} poses" if self.sampled else "proven"
-        return f"GrowthBound(B({self.times[-1]:.6g} s) = {self.bounds[-1]:.6g} s, {how})"
+        last = f"B({self.times[-1]:.6g} s) = {self.bounds[-1]:.6g} s"
+        return f"GrowthBound({last}, sampled at {self.samples} poses)"
 
 
 def ring_poses(
@@ -109,8 +108,8 @@ def growth_bound(
     of the goal, drives there and rests. The family is: the headings ``HEADINGS`` to both sides, the
     two along the line to the goal (turn, move, turn), the one it has; one spin rate and one speed
     of the library in each word, of either sign; and rest, all the time. All coasting times are
-    free, so B bounds the value over words with free switching times; on a fixed grid of switching
-    times use `growth_of_values`. Exact but for rounding where the exponents are even, up to 8.
+    free, so B bounds the value over words with free switching times. Exact but for rounding where
+    the exponents are even, up to 8.
 
     Source: the idea, Worthmann et al. (2016), *Model predictive control of nonholonomic mobile
     robots without stabilizing constraints and costs*; the family of words is ours.
@@ -152,40 +151,13 @@ def growth_bound(
     least = float(cost.control_rates(automaton.controls).min())
     seen = np.concatenate([rows[:, :2], wrapped(rows[:, 2:])], axis=-1).reshape(-1, 3)
     values = np.array([_values(pose, paces, cost, t) for pose in seen])
-    return growth_of_values(values, cost.pose_rates(seen) + least, times=t, poses=seen)
-
-
-def growth_of_values(
-    values: ArrayLike, least: ArrayLike, *, times: ArrayLike, poses: ArrayLike
-) -> GrowthBound:
-    """B(t) from values (n, k) that were found at poses (n, 3) for the horizons `times` (k,).
-
-    An upper bound of a value will do. `least` (n,) is the least stage cost at each pose: per second
-    for B in seconds, per interval (and times counted in intervals) for `discrete_index`.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit, or a least stage cost is not positive.
-
-    Examples
-    --------
-    >>> growth_of_values([[1, 3], [1, 2]], [1, 0.5], times=[1, 2], poses=np.eye(3)[:2]).bounds
-    array([2., 4.])
-    """
-    found, rates = as_array("values", values), as_array("least", least)
-    t, places = as_array("times", times), as_array("poses", poses, last=3)
-    if found.shape != (rates.size, t.size) or places.shape != (rates.size, 3):
-        raise ValueError(
-            f"values: got shape {found.shape} for {rates.size} poses and {t.size} times, need a "
-            "row per pose and a column per time"
-        )
+    rates = cost.pose_rates(seen) + least
     if not (rates > 0.0).all():
         raise ValueError(f"least: got {rates.min()}, need positive costs: leave out the goal")
-    ratios = found / rates[:, None]
+    ratios = values / rates[:, None]
     worst = np.argmax(ratios, axis=0)
     bounds = np.maximum.accumulate(ratios[worst, np.arange(t.size)])
-    return GrowthBound(times=t, bounds=bounds, worst=places[worst], samples=rates.size)
+    return GrowthBound(times=t, bounds=bounds, worst=seen[worst], samples=rates.size)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

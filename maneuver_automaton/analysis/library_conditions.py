@@ -1,17 +1,13 @@
-"""Conditions under which a library of trims reaches every pose, and a word that does."""
+"""Conditions under which a library of trims reaches every pose."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, wrapped
-
-TrimSequence = list[tuple[int, float]]
-"""Trims by index, each with its coasting time [s], in order."""
+from maneuver_automaton._arrays import Array, as_array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -90,67 +86,6 @@ def check_library(
         missing=tuple(missing),
         message=message,
     )
-
-
-def turn_move_turn(
-    start: ArrayLike, goal: ArrayLike, *, body_velocities: ArrayLike, angle_tolerance: float = 1e-12
-) -> TrimSequence:
-    """Spin until the goal lies ahead, drive there, spin to its heading: the quickest such word.
-
-    Source: the paper, Lemma 11.
-
-    Parameters
-    ----------
-    start, goal : (3,) arrays
-        Poses x [m], y [m], heading [rad]; headings are equal modulo a full turn.
-    body_velocities : (m, 3) array
-        Twist of each trim [m/s, m/s, rad/s].
-    angle_tolerance : float
-        Turns up to this angle are not made [rad].
-
-    Returns
-    -------
-    list of (trim index, duration [s])
-        At most three trims, each of positive duration; none if the start is the goal.
-
-    Raises
-    ------
-    ValueError
-        If the library has no forward straight or no spin.
-
-    Examples
-    --------
-    >>> twists = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, np.pi / 4]]
-    >>> turn_move_turn([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], body_velocities=twists)
-    [(2, 6.0), (1, 2.0), (2, 2.0)]
-    """
-    twists = np.stack(_columns(body_velocities), axis=-1)
-    library = check_library(twists)
-    if not (library.straights and library.spins):
-        raise ValueError(f"turn_move_turn: {library.message}")
-    begin, end = as_array("start", start, last=3), as_array("goal", goal, last=3)
-    distance = math.dist(begin[:2], end[:2])
-    ahead = math.atan2(end[1] - begin[1], end[0] - begin[0]) if distance else float(begin[2])
-    straight = max(library.straights, key=lambda i: float(twists[i, 0]))
-    word = [
-        _turn(ahead - float(begin[2]), twists, library.spins, angle_tolerance),
-        (straight, distance / float(twists[straight, 0])),
-        _turn(float(end[2]) - ahead, twists, library.spins, angle_tolerance),
-    ]
-    return [(trim, duration) for trim, duration in word if duration > 0.0]
-
-
-def _turn(
-    angle: float, twists: Array, spins: tuple[int, ...], tolerance: float
-) -> tuple[int, float]:
-    """Quickest spin through an angle modulo a full turn, and how long it takes."""
-    if abs(wrapped(angle)) <= tolerance:
-        return spins[0], 0.0
-    times = {}
-    for spin in spins:
-        rate = float(twists[spin, 2])
-        times[spin] = (math.copysign(1.0, rate) * angle) % (2 * math.pi) / abs(rate)
-    return min(times.items(), key=lambda item: item[1])
 
 
 def _columns(body_velocities: ArrayLike) -> tuple[Array, Array, Array]:

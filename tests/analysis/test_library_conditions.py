@@ -1,16 +1,11 @@
-"""Which libraries reach every pose, and by which word."""
+"""Which libraries reach every pose."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.analysis import check_library, turn_move_turn
-from maneuver_automaton.groups import SE2
-from tests.compare import assert_same_motion
+from maneuver_automaton.analysis import check_library
 
 REST, AHEAD, LEFT, RIGHT, ARC = (
     [0.0, 0.0, 0.0],
@@ -19,14 +14,6 @@ REST, AHEAD, LEFT, RIGHT, ARC = (
     [0.0, 0.0, -2.0],
     [1.0, 0.0, 1.0],
 )
-POSES = arrays(np.float64, 3, elements=st.floats(-10.0, 10.0))
-
-
-def end_of(word, twists, start):
-    end = SE2(start)
-    for trim, duration in word:
-        end = end @ SE2.exp(duration * np.array(twists[trim]))
-    return end
 
 
 def test_all_conditions_hold():
@@ -56,41 +43,6 @@ def test_what_is_missing_is_named(twists, max_trims, message):
         raise ValueError(report.message)
 
 
-@pytest.mark.parametrize("spins", [[LEFT], [RIGHT], [LEFT, RIGHT]])
-@given(start=POSES, goal=POSES)
-def test_turn_move_turn_ends_at_the_goal(spins, start, goal):
-    twists = [REST, AHEAD, *spins]
-    word = turn_move_turn(start, goal, body_velocities=twists)
-    assert len(word) <= 3
-    assert all(duration > 0.0 for _, duration in word)
-    assert_same_motion(end_of(word, twists, start), SE2(goal), atol=1e-9, modulo_turn=True)
-
-
-def test_the_quicker_spin_is_taken():
-    # a quarter turn to the left takes longer than three quarters at four times the rate
-    twists = [AHEAD, [0.0, 0.0, 0.5], [0.0, 0.0, -2.0]]
-    word = turn_move_turn(np.zeros(3), [0.0, 0.0, np.pi / 2], body_velocities=twists)
-    assert word == [(2, pytest.approx(0.75 * np.pi))]
-
-
-def test_the_fastest_straight_is_taken():
-    word = turn_move_turn(
-        np.zeros(3), [6.0, 0.0, 0.0], body_velocities=[[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], LEFT]
-    )
-    assert word == [(1, 2.0)]
-
-
-def test_no_spin_through_a_full_turn_for_a_rounding_error():
-    word = turn_move_turn([0.0, 0.0, 1e-16], [3.0, 0.0, 2 * np.pi], body_velocities=[AHEAD, LEFT])
-    assert word == [(0, 2.0)]
-
-
-def test_no_motion_where_the_start_is_the_goal():
-    assert turn_move_turn([1, 2, 3], [1, 2, 3], body_velocities=[AHEAD, LEFT]) == []
-
-
 def test_an_unfit_library_is_refused():
-    with pytest.raises(ValueError, match=r"turn_move_turn: library does not reach .* no spin"):
-        turn_move_turn(np.zeros(3), np.ones(3), body_velocities=[REST, AHEAD])
     with pytest.raises(ValueError, match=r"body_velocities: got shape \(3,\), need \(m, 3\)"):
         check_library([1.0, 0.0, 0.0])
