@@ -121,6 +121,38 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
 }
 
 
+def check_range(
+    what: str,
+    value: float | None,
+    *,
+    least: float | None = None,
+    unit: str = "",
+    infinite: bool = False,
+) -> None:
+    """Raise a ValueError if a number is not positive, or not at least `least`; None is no number.
+
+    `infinite`: it may be so.
+    """
+    inside = value is None or (value > 0.0 if least is None else value >= least)
+    if not inside or (value == math.inf and not infinite):
+        need = "finite" if inside else "positive" if least is None else f"at least {least:g}"
+        raise ValueError(f"{what} must be {need}, got {value}{unit and ' ' + unit}")
+
+
+def check_fields(
+    about: str,
+    instance: Any,
+    *names: str,
+    least: float | None = None,
+    unit: str = "",
+    infinite: bool = False,
+) -> None:
+    """Raise a ValueError if one of these fields is out of its range; see `check_range`."""
+    for name in names:
+        what, value = f"{about}: {name}", getattr(instance, name)
+        check_range(what, value, least=least, unit=unit, infinite=infinite)
+
+
 def wrapped(angle: ArrayLike) -> Array:
     """Angles [rad] modulo a full turn, in [-pi, pi]."""
     return np.asarray(np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi, dtype=np.float64)

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, TypeAlias, TypeVar
 
+from maneuver_automaton._arrays import check_range
 from maneuver_automaton._interrupts import children_ignore_signals, patient, serving, stopped
 
 LOCAL = "local"  # a cluster on this machine
@@ -35,8 +36,7 @@ def in_parallel(
     ends_early: bool = False,
 ) -> Iterator[Result]:
     """Results of all pieces, one by one as they come."""
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    check_range("jobs", jobs, least=1)
     if scheduler is None:
         return _results(function, pieces, jobs, order, ends_early)
     client = _client(scheduler, jobs)

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_fields, plain_numbers
 from maneuver_automaton._brief import brief
 
 NORM_ORDERS = (1.0, 2.0, math.inf)
@@ -62,11 +62,8 @@ class Cost:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        weights = {name: getattr(self, name) for name in WEIGHTS}
-        for name, weight in weights.items():
-            if not (math.isfinite(weight) and weight >= 0.0):
-                raise ValueError(f"cost: {name} must be a number of at least 0, got {weight}")
-        if not any(weights.values()):
+        check_fields("cost", self, *WEIGHTS, least=0)
+        if not any(getattr(self, name) for name in WEIGHTS):
             raise ValueError(f"cost: {', '.join(WEIGHTS)} are all zero, need at least one positive")
         if self.norm_order not in NORM_ORDERS:
             raise ValueError(f"cost: norm_order must be 1, 2 or inf, got {self.norm_order}")

@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
+from maneuver_automaton._arrays import (
+    Array,
+    as_array,
+    as_number,
+    check_fields,
+    check_range,
+    freeze,
+    plain_numbers,
+)
 from maneuver_automaton._brief import brief
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton._limits import check_size
@@ -106,9 +114,8 @@ class Clearance:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        _check_number("clearance: weight", self.weight)
-        if not (math.isfinite(self.within) and self.within > 0.0):
-            raise ValueError(f"clearance: within must be positive, got {self.within} m")
+        check_fields("clearance", self, "weight", least=0)
+        check_fields("clearance", self, "within", unit="m")
         _check_per("clearance", self.per)
 
     def rates(self, poses: Array, velocities: Array) -> Array:
@@ -241,7 +248,7 @@ class Ground:
     def __post_init__(self) -> None:
         plain_numbers(self)
         object.__setattr__(self, "areas", as_shapes("ground", self.areas))
-        _check_number("ground: price", self.price)
+        check_fields("ground", self, "price", least=0)
         _check_per("ground", self.per)
         if bool(self.areas) == (self.raster is not None):
             raise ValueError("ground: need areas or a raster")
@@ -267,8 +274,7 @@ class Ground:
         [2.0]
         """
         values = as_array("ground: prices", prices)
-        if values.size and values.min() < 0.0:
-            raise ValueError(f"ground: prices must be at least 0, got {values.min():g}")
+        check_range("ground: prices", values.min(initial=0.0), least=0)
         raster = Raster(values, resolution=resolution, origin=as_array("ground: origin", origin))
         return cls((), price, per=per, raster=raster)
 
@@ -329,7 +335,8 @@ class Ground:
         """
         values = as_array("elevation: heights", heights)
         if max_cross_slope is not None:
-            _check_number("elevation: max_cross_slope", max_cross_slope)
+            max_cross_slope = as_number("elevation: max_cross_slope", max_cross_slope)
+            check_range("elevation: max_cross_slope", max_cross_slope, least=0)
         hills = Raster(
             values,
             resolution=resolution,
@@ -448,8 +455,7 @@ class Raster:
             raise ValueError(
                 f"ground: the raster has shape {self.values.shape}, need (rows, columns)"
             )
-        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
-            raise ValueError(f"ground: resolution must be positive, got {self.resolution} m")
+        check_fields("ground", self, "resolution", unit="m")
         check_size("ground: origin", self.origin[:2])
         if self.are_heights:
             x, y = (
@@ -581,8 +587,7 @@ def scale_of(cost: PlaceCost) -> float:
     """Size [m] of the finest feature."""
     about = f"place cost {type(cost).__name__}: scale"
     scale = as_number(about, getattr(cost, "scale", SCALE))
-    if not scale > 0.0:
-        raise ValueError(f"{about} must be positive, got {scale} m")
+    check_range(about, scale, unit="m", infinite=True)
     return scale
 
 
@@ -642,11 +647,6 @@ def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:
     middle = np.clip(at - 0.5, 0.0, count - 1.0)
     cell = np.minimum(middle.astype(np.int64), count - 1)
     return cell, middle - cell
-
-
-def _check_number(what: str, value: float) -> None:
-    if not (math.isfinite(as_number(what, value)) and value >= 0.0):
-        raise ValueError(f"{what} must be a number of at least 0, got {value}")
 
 
 def _check_per(what: str, per: Any) -> None:

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton import place_prices
-from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
+from maneuver_automaton._arrays import (
+    Array,
+    as_array,
+    as_number,
+    check_fields,
+    check_range,
+    freeze,
+    plain_numbers,
+)
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first, kept_with
 from maneuver_automaton._limits import MOST_HEADING, MOST_TURNS, check_heading, check_size
@@ -85,10 +93,7 @@ class Goal:
             raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
         check_size("goal: pose", self.pose[[0, 1, *range(3, self.pose.size)]])
         check_heading("goal: pose", self.pose)
-        for name in ("tolerance_m", "tolerance_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"goal: {name} must be a number of at least 0, got {value}")
+        check_fields("goal", self, "tolerance_m", "tolerance_rad", least=0)
 
     def off(self, pose: Array) -> tuple[float, float]:
         """How far a pose (dof,) is from this one: distance [m] and turn [rad], 0 if any will do.
@@ -121,18 +126,13 @@ class Horizon:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("time", "max_time"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"horizon: {name} must be positive, got {value} s")
+        check_fields("horizon", self, "time", "max_time", unit="s")
         if self.time is not None and self.max_time is not None:
             raise ValueError("horizon: max_time is for a free final time, but time is fixed")
         if self.time is not None and self.stay:
             raise ValueError("horizon: stay is for a free final time, but time is fixed")
-        if self.max_trims is not None and self.max_trims < 1:
-            raise ValueError(f"horizon: max_trims must be at least 1, got {self.max_trims}")
-        if not (math.isfinite(self.min_coast) and self.min_coast >= 0.0):
-            raise ValueError(f"horizon: min_coast must be at least 0, got {self.min_coast} s")
+        check_fields("horizon", self, "max_trims", least=1)
+        check_fields("horizon", self, "min_coast", least=0, unit="s")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -182,16 +182,8 @@ class SearchSettings:
             raise ValueError(
                 f"search: method must be one of {', '.join(SEARCH_METHODS)}, got {self.method!r}"
             )
-        if self.max_expansions is not None and self.max_expansions < 1:
-            raise ValueError(
-                f"search: max_expansions must be at least 1, got {self.max_expansions}"
-            )
-        if self.cell is not None and not (math.isfinite(self.cell) and self.cell > 0.0):
-            raise ValueError(f"search: cell must be positive, got {self.cell} m")
-        if self.headings is not None and self.headings < 1:
-            raise ValueError(f"search: headings must be at least 1, got {self.headings}")
-        if self.weight is not None and not (math.isfinite(self.weight) and self.weight >= 1.0):
-            raise ValueError(f"search: weight must be at least 1, got {self.weight}")
+        check_fields("search", self, "cell", unit="m")
+        check_fields("search", self, "max_expansions", "headings", "weight", least=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,8 +342,7 @@ class Problem:
         for zone in self.zones:
             for trim in zone.trims or ():
                 self.automaton.index_of(trim)
-        if not (math.isfinite(self.margin) and self.margin >= 0.0):
-            raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
+        check_range("margin", self.margin, least=0, unit="m")
         object.__setattr__(self, "via", _as_vias(self.via))
         if self.order not in ORDERS:
             raise ValueError(f"order must be one of {', '.join(ORDERS)}, got {self.order!r}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_fields, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_heading, check_size
 from maneuver_automaton.groups import LieGroup
@@ -93,10 +93,7 @@ class Via:
             raise ValueError(f"via: pose has shape {self.pose.shape}, need one pose")
         check_size("via: pose", self.place)
         check_heading("via: pose", self.pose)
-        for name in ("tolerance_m", "stay_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"via: {name} must be a number of at least 0, got {value}")
+        check_fields("via", self, "tolerance_m", "stay_s", least=0)
         object.__setattr__(self, "stop", bool(self.stop or self.stay_s > 0.0))
         if self.gate is None:
             return

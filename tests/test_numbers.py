@@ -216,8 +216,11 @@ def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):
         (lambda: ma.Cost(time=10**400), "Cost: time: got 1000000.{1,80}, need a number"),
         (lambda: ma.Horizon(stay="false"), "Horizon: stay: got 'false', need True or False"),
         (lambda: ma.Clearance(None, 1.0), "Clearance: weight: got None, need a number"),
-        (lambda: PLAN.sample(max_step_m=0), "plan: steps must be positive, got 0.0 m and 0.05 rad"),
-        (lambda: PLAN.sample(max_step_rad=float("nan")), "plan: steps must be positive, got 0.05"),
+        (lambda: PLAN.sample(max_step_m=0), "plan: max_step_m must be positive, got 0.0 m"),
+        (
+            lambda: PLAN.sample(max_step_rad=float("nan")),
+            "plan: max_step_rad must be positive, got nan",
+        ),
     ],
 )
 def test_what_is_no_number_is_named(make, message):

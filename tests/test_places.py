@@ -206,11 +206,11 @@ def test_plans_say_what_they_cost_and_where():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Clearance(-1.0, 1.0), "clearance: weight must be a number of at least 0, got -1"),
+        (lambda: Clearance(-1.0, 1.0), "clearance: weight must be at least 0, got -1"),
         (lambda: Clearance(1.0, 0.0), "clearance: within must be positive, got 0.0 m"),
         (lambda: Clearance(1.0, 1.0, per="mile"), "per must be 'metre' or 'second', got 'mile'"),
         (lambda: Ground((), 1.0), "ground: need areas or a raster"),
-        (lambda: Ground(LAWN, math.nan), "ground: price must be a number of at least 0"),
+        (lambda: Ground(LAWN, math.nan), "ground: price must be at least 0"),
         (lambda: Ground.of_raster([[-1.0]], resolution=1.0), "prices must be at least 0, got -1"),
         (lambda: Ground.of_raster([1.0], resolution=1.0), "has shape (1,), need (rows, columns)"),
         (

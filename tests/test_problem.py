@@ -223,7 +223,8 @@ def test_what_else_is_wrong_is_said(values, message):
 def test_tolerances_are_numbers_of_at_least_zero(name, value):
     with pytest.raises(ValueError) as error:
         Goal(pose=[0, 0, 0], **{name: value})
-    assert str(error.value) == f"goal: {name} must be a number of at least 0, got {value}"
+    need = "finite" if value == math.inf else "at least 0"
+    assert str(error.value) == f"goal: {name} must be {need}, got {value}"
 
 
 def test_the_pose_of_a_goal_has_two_to_four_numbers():
@@ -236,7 +237,7 @@ def test_the_pose_of_a_goal_has_two_to_four_numbers():
     [
         ({"time": 0.0}, "horizon: time must be positive, got 0.0 s"),
         ({"time": -1.0}, "horizon: time must be positive, got -1.0 s"),
-        ({"time": math.inf}, "horizon: time must be positive, got inf s"),
+        ({"time": math.inf}, "horizon: time must be finite, got inf s"),
         ({"time": math.nan}, "horizon: time must be positive, got nan s"),
         ({"max_time": 0.0}, "horizon: max_time must be positive, got 0.0 s"),
         ({"max_time": math.nan}, "horizon: max_time must be positive, got nan s"),
@@ -245,7 +246,7 @@ def test_the_pose_of_a_goal_has_two_to_four_numbers():
         ({"max_trims": 0}, "horizon: max_trims must be at least 1, got 0"),
         ({"min_coast": -0.1}, "horizon: min_coast must be at least 0, got -0.1 s"),
         ({"min_coast": math.nan}, "horizon: min_coast must be at least 0, got nan s"),
-        ({"min_coast": math.inf}, "horizon: min_coast must be at least 0, got inf s"),
+        ({"min_coast": math.inf}, "horizon: min_coast must be finite, got inf s"),
     ],
 )  # fmt: skip
 def test_wrong_horizons_are_named(values, message):

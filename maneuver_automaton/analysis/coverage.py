@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, plain_numbers, wrapped
+from maneuver_automaton._arrays import Array, IntArray, check_fields, plain_numbers, wrapped
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
@@ -46,9 +46,8 @@ class ReachSettings:
             raise ValueError(
                 f"reach: measure must be one of {', '.join(MEASURES)}, got {self.measure!r}"
             )
-        for name in ("most", "edge_cost", "same_m", "same_rad", "most_nodes"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"reach: {name} must be positive, got {getattr(self, name)}")
+        sizes = ("most", "edge_cost", "same_m", "same_rad", "most_nodes")
+        check_fields("reach", self, *sizes, infinite=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -207,9 +206,7 @@ class CoverageSettings:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("radius", "metres_per_radian", "samples", "pairs"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"coverage: {name} must be positive, got {getattr(self, name)}")
+        check_fields("coverage", self, "radius", "metres_per_radian", "samples", "pairs")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

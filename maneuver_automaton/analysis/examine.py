@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, freeze, vector_text
+from maneuver_automaton._arrays import Array, check_range, freeze, vector_text
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import Model
 
@@ -237,10 +237,8 @@ def examine(
     tolerance: float,
 ) -> SymmetryReport:
     """Try `samples` random states for every coordinate of the group."""
-    if samples < 1:
-        raise ValueError(f"samples: got {samples}, need at least 1")
-    if not tolerance > 0.0:
-        raise ValueError(f"tolerance: got {tolerance}, need a positive number")
+    check_range("samples", samples, least=1)
+    check_range("tolerance", tolerance, infinite=True)
     rng = np.random.default_rng(0) if rng is None else rng
 
     def tried(axis: int) -> Worst:

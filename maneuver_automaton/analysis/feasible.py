@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, as_number, freeze
+from maneuver_automaton._arrays import Array, as_array, as_number, check_range, freeze
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
@@ -153,10 +153,8 @@ def feasible_set(
     """
     within = as_number("feasible set: within", within)
     resolution = as_number("feasible set: resolution", resolution)
-    if not (math.isfinite(within) and within > 0.0):
-        raise ValueError(f"feasible set: the time must be positive, got {within} s")
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise ValueError(f"feasible set: resolution must be positive, got {resolution} m")
+    check_range("feasible set: within", within, unit="s")
+    check_range("feasible set: resolution", resolution, unit="m")
     angles = as_array("feasible set: headings", headings)
     if angles.ndim != 1 or not angles.size:
         raise ValueError(f"feasible set: got headings of shape {angles.shape}, need (k,)")

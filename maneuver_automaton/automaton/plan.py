@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
+from maneuver_automaton._arrays import (
+    Array,
+    as_array,
+    as_number,
+    check_range,
+    freeze,
+    plain_numbers,
+)
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
 from maneuver_automaton.automaton.plan_arrays import PlanArrays, plan_arrays
@@ -374,10 +381,8 @@ class Plan(Played):
         """
         max_step_m = as_number("plan: max_step_m", max_step_m)
         max_step_rad = as_number("plan: max_step_rad", max_step_rad)
-        if not (max_step_m > 0.0 and max_step_rad > 0.0):
-            raise ValueError(
-                f"plan: steps must be positive, got {max_step_m} m and {max_step_rad} rad"
-            )
+        check_range("plan: max_step_m", max_step_m, unit="m", infinite=True)
+        check_range("plan: max_step_rad", max_step_rad, unit="rad", infinite=True)
         if not self.primitives:
             states = [trim.reduced_state for trim in self.trims]
             return Trajectory(

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, as_number
+from maneuver_automaton._arrays import Array, IntArray, as_number, check_range
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
@@ -134,8 +134,7 @@ def _arrays(plan: _Sampled, samples: Trajectory, model: Model | None) -> PlanArr
 def step_times(start: float, duration: float, step: float) -> Array:
     """Times (n,) from start to end [s]: every step, and the end."""
     step = as_number("as_arrays: step", step)
-    if not (math.isfinite(step) and step > 0.0):
-        raise ValueError(f"as_arrays: step must be positive, got {step} s")
+    check_range("as_arrays: step", step, unit="s")
     count = max(0, math.ceil(duration / step - ROUNDING))
     return np.append(start + step * np.arange(count), start + duration)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._arrays import Array, check_fields, wrapped
 from maneuver_automaton.automaton.plan import Plan
 
 ROUNDING = 1e-9  # [m] that two turns on the spot may differ by
@@ -24,9 +24,8 @@ class Likeness:
     heading: float  # [rad] between headings at equal times
 
     def __post_init__(self) -> None:
-        for name in ("per_metre", "most_metres", "heading"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"likeness: {name} must be at least 0, got {getattr(self, name)}")
+        sizes = ("per_metre", "most_metres", "heading")
+        check_fields("likeness", self, *sizes, least=0, infinite=True)
 
 
 CONVERGED = Likeness(per_metre=1e-3, most_metres=1.0, heading=1e-3)  # times solved to the end

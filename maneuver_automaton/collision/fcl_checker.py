@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
 from maneuver_automaton.collision.shapes import AnyObstacle, Shape, by_kind
@@ -68,10 +68,8 @@ class FclChecker:
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.margin) and self.margin >= 0.0):
-            raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
-        if not (math.isfinite(self.proven) and self.proven > 0.0):
-            raise ValueError(f"proven must be a positive number, got {self.proven} m")
+        check_range("margin", self.margin, least=0, unit="m")
+        check_range("proven", self.proven, unit="m")
         x, y = as_array("origin", self.origin, last=2).tolist()
         excess = 0.25 * self.proven  # of round corners, on either side; the rest is for slices
         object.__setattr__(self, "footprint", tuple(self.footprint))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_fields, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import LARGEST_BODY, check_size
 from maneuver_automaton.collision.geometry import (
@@ -110,8 +110,7 @@ class Disc:
     def __post_init__(self) -> None:
         plain_numbers(self)
         freeze(self, "center", last=2)
-        if not (math.isfinite(self.radius) and self.radius > 0.0):
-            raise ValueError(f"disc: radius must be positive, got {self.radius} m")
+        check_fields("disc", self, "radius", unit="m")
         check_size("disc: radius", self.radius)
         check_size("disc: center", self.center)
 
@@ -352,8 +351,7 @@ class OccupancyMap:
         cells.setflags(write=False)
         object.__setattr__(self, "blocked", cells)
         freeze(self, "origin", last=3)
-        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
-            raise ValueError(f"map: resolution must be positive, got {self.resolution} m")
+        check_fields("map", self, "resolution", unit="m")
         check_size("map: origin", self.origin[:2])
         check_size("map: size", self.extent)
 

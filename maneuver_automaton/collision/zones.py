@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, plain_numbers
+from maneuver_automaton._arrays import Array, check_fields, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision.shapes import AnyShape, Shape, as_shape
 from maneuver_automaton.groups import LieGroup
@@ -58,10 +57,7 @@ class Zone:
     def __post_init__(self) -> None:
         plain_numbers(self)
         object.__setattr__(self, "shape", as_shape("zone", self.shape))
-        for name in ("max_speed", "max_lateral_acceleration"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"zone: {name} must be a number of at least 0, got {value}")
+        check_fields("zone", self, "max_speed", "max_lateral_acceleration", least=0)
         if self.trims is not None:
             object.__setattr__(self, "trims", tuple(self.trims))
         limits = (self.max_speed, self.max_lateral_acceleration, self.trims)

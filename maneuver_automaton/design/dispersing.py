@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import Array, IntArray, check_range, wrapped
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 
@@ -78,8 +78,7 @@ def disperse_library(
             "disperse: the library has no maneuvers, whose ends could be spread; a kinematic "
             "vehicle has design_library"
         )
-    if metres_per_radian is not None and not 0.0 < metres_per_radian < math.inf:
-        raise ValueError(f"disperse: metres_per_radian must be positive, got {metres_per_radian}")
+    check_range("disperse: metres_per_radian", metres_per_radian)
     sources, targets = library.maneuver_classes.T
     apart = _distances(library, sources, metres_per_radian)
     # The maneuvers of the quickest ways from rest to all trims, and of those back.

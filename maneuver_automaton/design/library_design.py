@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole, check_range
 from maneuver_automaton._brief import brief
 from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.automaton import Automaton
@@ -224,9 +224,9 @@ def _proof_of_words(
         if not len(posed):
             raise ValueError("design: radius: max_trims needs a radius of goals [m], or tasks")
         radius = float(np.hypot(posed[:, 0], posed[:, 1]).max())
-    _check_positive("radius", radius, "m")
+    check_range("design: radius", radius, unit="m")
     least = 0.5 * turning_radius if least is None else least
-    _check_positive("least", least, "m")
+    check_range("design: least", least, unit="m")
     return functools.partial(
         proven_factor,
         turning_radius=turning_radius,
@@ -291,20 +291,13 @@ def _check(
             "design: prices of switch and direction_change belong to the scenario: the best of all "
             "words, which a design compares with, is known for prices per second and metre only"
         )
-    if not (math.isfinite(within) and within >= 1.0):
-        raise ValueError(f"design: within must be a factor of at least 1, got {within}")
-    if most < 1:
-        raise ValueError(f"design: most must be at least 1 trim, got {most}")
+    check_range("design: within", within, least=1)
+    check_range("design: most", most, least=1)
     if max_trims is not None and max_trims < FEWEST_TRIMS:
         raise ValueError(
             f"design: max_trims must be at least {FEWEST_TRIMS}, as a pose has so many "
             f"coordinates, got {max_trims}"
         )
-
-
-def _check_positive(name: str, value: float, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"design: {name} must be positive, got {value} {unit}")
 
 
 def design_of_file(

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, check_fields
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Lost, knowledge_of
@@ -133,21 +133,15 @@ class FleetHorizon:
             delay_steps=delay_steps,
             workers=workers,
         )
-        for name in ("step", "time_limit"):
-            if not (value := getattr(settings, name)) > 0.0:
-                raise ValueError(f"fleet horizon: {name} must be positive, got {value} s")
-        if not settings.margin >= 0.0:
-            raise ValueError(f"fleet horizon: margin must be at least 0, got {margin}")
+        about, counts = "fleet horizon", ("group_size", "swaps_per_step", "at_once")
+        check_fields(about, settings, "step", "time_limit", unit="s", infinite=True)
+        check_fields(about, settings, "margin", "delay_steps", least=0, infinite=True)
+        check_fields(about, settings, *counts, least=1)
         if not 0.0 <= settings.tube_m <= 0.5 * fleet.margin:
             raise ValueError(
                 f"fleet horizon: tube_m is {settings.tube_m:g} m, need at most half of the margin "
                 f"of the fleet, {fleet.margin:g} m: two bodies may both be off their plans"
             )
-        for name in ("group_size", "swaps_per_step", "at_once"):
-            if (count := getattr(settings, name)) is not None and count < 1:
-                raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
-        if settings.delay_steps < 0:
-            raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
         vehicles = vehicles_of(fleet)
         self.fleet = fleet
         knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from maneuver_automaton._arrays import as_number, as_whole
+from maneuver_automaton._arrays import as_number, as_whole, check_range
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
@@ -106,13 +106,11 @@ def plan_fleet(
     time_limit, seed = as_number("time_limit", time_limit), as_whole("seed", seed)
     orders, jobs = as_whole("orders", orders), as_whole("jobs", jobs)
     max_rounds = None if max_rounds is None else as_whole("max_rounds", max_rounds)
-    if not time_limit > 0.0:
-        raise ValueError(f"time_limit must be positive, got {time_limit} s")
+    check_range("time_limit", time_limit, unit="s", infinite=True)
+    check_range("orders", orders, least=1)
+    check_range("jobs", jobs, least=1)
     if objective not in ("sum", "last"):
         raise ValueError(f"objective must be 'sum' or 'last', got {objective!r}")
-    for name, count in (("orders", orders), ("jobs", jobs)):
-        if count < 1:
-            raise ValueError(f"{name} must be at least 1, got {count}")
     apart = jobs > 1 or scheduler is not None
     workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
     with workers as run, patient():

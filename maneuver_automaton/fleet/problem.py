@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._arrays import plain_numbers
+from maneuver_automaton._arrays import check_fields, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.collision.motion import planar
@@ -101,8 +100,7 @@ class FleetProblem:
         if twice:
             raise ValueError(f"fleet: two vehicles have the name {twice[0]!r}, need distinct names")
         check_size("fleet: margin", self.margin)
-        if not (math.isfinite(self.margin) and self.margin >= 0.0):
-            raise ValueError(f"fleet: margin must be a number of at least 0, got {self.margin} m")
+        check_fields("fleet", self, "margin", least=0, unit="m")
         for name, problem in zip(self.names, self.problems, strict=True):
             if problem.horizon.time is not None:
                 raise ValueError(

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_number, as_whole
+from maneuver_automaton._arrays import Array, as_number, as_whole, check_range
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.agreement import Lost
@@ -123,8 +123,7 @@ def simulate_fleet(
     steps, seed = as_whole("steps", steps), as_whole("seed", seed)
     step = as_number("step", step)
     first_time_limit = as_number("first_time_limit", first_time_limit)
-    if steps < 1:
-        raise ValueError(f"steps must be at least 1, got {steps}")
+    check_range("steps", steps, least=1)
     for what, times in (("joins_s", joins_s), ("breaks_s", breaks_s)):
         for name in times:
             if name not in fleet.names:

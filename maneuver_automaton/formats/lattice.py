@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, wrapped
+from maneuver_automaton._arrays import Array, as_array, check_range, freeze, wrapped
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.groups import SE2
@@ -71,10 +71,8 @@ def automaton_of_lattice(
     speed, turn_rate : float
         At which one pose follows another [m/s, rad/s]: a stretch takes the longer of the two times.
     """
-    if not (speed > 0.0 and turn_rate > 0.0):
-        raise ValueError(
-            f"lattice: speed and turn_rate must be positive, got {speed} m/s and {turn_rate} rad/s"
-        )
+    check_range("lattice: speed", speed, unit="m/s", infinite=True)
+    check_range("lattice: turn_rate", turn_rate, unit="rad/s", infinite=True)
     body = LatticeBody(resolution=lattice.resolution, turning_radius=lattice.turning_radius)
     trims = tuple(
         Trim(
@@ -218,11 +216,8 @@ class _LatticeTurn(NamedTuple):
 
 def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = False) -> Lattice:
     """Primitives that drive ahead on arcs of a least radius [m]; with `spins`, on the spot."""
-    if not (resolution > 0.0 and turning_radius > 0.0):
-        raise ValueError(
-            f"resolution and turning_radius must be positive, got {resolution} m and "
-            f"{turning_radius} m"
-        )
+    check_range("resolution", resolution, unit="m", infinite=True)
+    check_range("turning_radius", turning_radius, unit="m", infinite=True)
     radius = turning_radius / resolution
     if radius > MOST_CELLS:
         raise ValueError(

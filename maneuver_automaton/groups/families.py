@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, check_range, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups.se2 import SE2
 
@@ -153,8 +153,7 @@ def translations(n: int) -> type[LieGroup]:
     >>> group is translations(2)
     True
     """
-    if n < 1:
-        raise ValueError(f"translations: got n = {n}, need at least 1")
+    check_range("translations: n", n, least=1)
     names = ("x", "y", "z") if n <= 3 else tuple(f"x{i + 1}" for i in range(n))
     members = {"__slots__": (), "dof": n, "space": n, "coordinates": names[:n]}
     return cast(type[LieGroup], type(f"Translations{n}", (Translations,), members))

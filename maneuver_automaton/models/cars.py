@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_fields, plain_numbers
 from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 
@@ -49,8 +49,7 @@ class Car(Vehicle):
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        if not 0.0 < self.wheelbase < math.inf:
-            raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
+        check_fields("car", self, "wheelbase", unit="m")
         check_parameters(self)
 
     @property

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from maneuver_automaton._arrays import check_fields
 from maneuver_automaton.groups import LieGroup, SE2xR
 from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
@@ -83,8 +84,7 @@ class SingleTrack(Vehicle):
 
     def __post_init__(self) -> None:
         check_parameters(self)
-        if not self.min_speed > 0.0:
-            raise ValueError(f"{self.name}: min_speed must be positive, got {self.min_speed}")
+        check_fields(self.name, self, "min_speed")
 
     @property
     def wheelbase(self) -> float:

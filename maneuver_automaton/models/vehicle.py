@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_range, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 
 Components = Sequence[Any] | Array
@@ -133,8 +133,8 @@ def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
     values = {one.name: getattr(vehicle, one.name) for one in fields(vehicle)}
     for one, value in values.items():
         unsigned = one in (*but, AT_REST) or one.startswith("min_")
-        if value is not None and not unsigned and not 0.0 < value < math.inf:
-            raise ValueError(f"{name}: {one} must be positive, got {value}")
+        if not unsigned:
+            check_range(f"{name}: {one}", value)
     for one in ("max_steering", "max_articulation", "max_tilt"):
         if (angle := values.get(one)) is not None and not angle < math.pi / 2:
             raise ValueError(f"{name}: {one} must be less than pi / 2, got {angle} rad")
@@ -144,8 +144,7 @@ def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
             raise ValueError(
                 f"{name}: min_{one} must be less than max_{one} {most} {unit}, got {least} {unit}"
             )
-    if not (price := values.get(AT_REST, 0.0)) >= 0.0:
-        raise ValueError(f"{name}: {AT_REST} must be at least 0, or inf, got {price} 1/rad")
+    check_range(f"{name}: {AT_REST}", values.get(AT_REST), least=0, unit="1/rad", infinite=True)
 
 
 UNLIMITED = (-math.inf, math.inf)

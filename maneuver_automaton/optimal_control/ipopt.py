@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, check_fields
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.errors import MissingExtra
 
@@ -78,9 +78,7 @@ class SolverSettings:
     far: bool = False  # whether guesses may be far from the solution
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "max_iterations", "admitted_defect"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"solver: {name} must be positive, got {getattr(self, name)}")
+        check_fields("solver", self, "tolerance", "max_iterations", "admitted_defect")
 
 
 def ipopt_options(settings: SolverSettings) -> dict[str, Any]:

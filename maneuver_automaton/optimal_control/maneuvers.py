@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, plain_numbers
+from maneuver_automaton._arrays import Array, check_fields, plain_numbers
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import problem as programs
@@ -80,9 +80,7 @@ class TransferSettings:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("intervals", "steps"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"maneuver: {name} must be at least 1, got {getattr(self, name)}")
+        check_fields("maneuver", self, "intervals", "steps", least=1)
         low, high = self.duration
         if not 0.0 < low < high < math.inf:
             raise ValueError(

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, check_fields, freeze
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.vehicle import Components
@@ -136,8 +136,7 @@ class TimeGrid:
     held: int = 1  # with "rk4", the steps from node to node in which one control holds
 
     def __post_init__(self) -> None:
-        if self.n_nodes < 2:
-            raise ValueError(f"grid: n_nodes must be at least 2, got {self.n_nodes}")
+        check_fields("grid", self, "n_nodes", least=2)
         if self.rule not in get_args(Rule):
             raise ValueError(f"grid: rule must be {' or '.join(get_args(Rule))}, got {self.rule!r}")
 
@@ -172,8 +171,7 @@ class Guess:
                     f"guess: {name} has shape {getattr(self, name).shape}, need at least one row, "
                     "one for each instant"
                 )
-        if not (math.isfinite(self.duration) and self.duration > 0.0):
-            raise ValueError(f"guess: duration must be positive, got {self.duration} s")
+        check_fields("guess", self, "duration", unit="s")
 
     @classmethod
     def of_motion(cls, times: Array, *, known: Array, state: Array, control: Array) -> Guess:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, check_range
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.ipopt import SolverSettings
@@ -119,8 +119,7 @@ def solve_uniform_effort_example(
     """
     grid = TimeGrid(n_nodes=n_nodes, rule=rule)
     least = 2 * END_NODES + 1 + n_nodes - grid.n_controls
-    if n_nodes < least:
-        raise ValueError(f"uniform effort example: n_nodes must be at least {least}, got {n_nodes}")
+    check_range("uniform effort example: n_nodes", n_nodes, least=least)
     guess = EVEN_PACE if guess is None else guess
     soft = solve(example_problem(smoothing=SOFT), grid, guess=guess, settings=settings)
     sharp = solve(example_problem(), grid, guess=soft.as_guess, settings=settings)

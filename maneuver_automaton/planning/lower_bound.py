@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from maneuver_automaton._arrays import as_number, as_whole
+from maneuver_automaton._arrays import as_number, as_whole, check_range
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.planning.proving import Proving, known_bound
@@ -77,12 +77,10 @@ def lower_bound(
     max_work = None if max_work is None else as_whole("max_work", max_work)
     if max_direction_changes is not None:
         max_direction_changes = as_whole("max_direction_changes", max_direction_changes)
-    if not time_limit > 0.0:
-        raise ValueError(f"time_limit must be positive, got {time_limit} s")
+    check_range("time_limit", time_limit, unit="s", infinite=True)
     if not 0.0 <= gap <= 1.0:
         raise ValueError(f"gap must be a share from 0 to 1, got {gap}")
-    if max_direction_changes is not None and max_direction_changes < 0:
-        raise ValueError(f"max_direction_changes must be at least 0, got {max_direction_changes}")
+    check_range("max_direction_changes", max_direction_changes, least=0)
     watch = Watch(gap=gap, cost=incumbent)
     budget = Budget.from_now(time_limit)
     if max_direction_changes is not None and problem.automaton.is_kinematic:

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole, check_range
 from maneuver_automaton._files import journal as opened
 from maneuver_automaton._files import journal_lines
 from maneuver_automaton._parallel import in_parallel
@@ -183,8 +183,7 @@ def _answers(
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Any]:
     jobs = as_whole("jobs", jobs)
-    if not asked.time_limit > 0.0:
-        raise ValueError(f"time_limit must be positive, got {asked.time_limit} s")
+    check_range("time_limit", asked.time_limit, unit="s", infinite=True)
     if journal is not None and asked.take is None:
         raise ValueError("journal: keeps what is taken of the answers, need take=")
     kept: list[Any] = []

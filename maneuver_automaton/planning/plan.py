@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from queue import SimpleQueue
 
-from maneuver_automaton._arrays import as_number, as_whole
+from maneuver_automaton._arrays import as_number, as_whole, check_range
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_with
 from maneuver_automaton._kernel_list import expect_many_calls, load_kernels
@@ -126,10 +126,8 @@ def plan_in(
     time_limit = as_number("time_limit", time_limit)
     alternatives = min(as_whole("alternatives", alternatives), MOST_ALTERNATIVES)
     gap = None if gap is None else as_number("gap", gap)
-    if not time_limit > 0.0:
-        raise ValueError(f"time_limit must be positive, got {time_limit} s")
-    if alternatives < 0:
-        raise ValueError(f"alternatives must be at least 0, got {alternatives}")
+    check_range("time_limit", time_limit, unit="s", infinite=True)
+    check_range("alternatives", alternatives, least=0)
     if gap is not None and not 0.0 <= gap < 1.0:
         raise ValueError(f"gap must be a share from 0 to below 1, got {gap}")
     load(problem, workspace)

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array, IntArray, check_range
 from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
@@ -289,10 +289,9 @@ def ramp_of(
     Ramp(peak=-1.0, speed_up=1.0, cruise=3.0, brake=1.0)
     """
     brake = acceleration if deceleration is None else deceleration
-    given = {"max_speed": max_speed, "acceleration": acceleration, "deceleration": brake}
-    for name, value in given.items():
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"ramp: {name} must be positive, got {value}")
+    check_range("ramp: max_speed", max_speed)
+    check_range("ramp: acceleration", acceleration)
+    check_range("ramp: deceleration", brake)
     if not math.isfinite(length):
         raise ValueError(f"ramp: length must be finite, got {length}")
     ramps = 0.5 / acceleration + 0.5 / brake  # length of both ramps over the squared peak

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.primitive import Trajectory
 
@@ -291,9 +291,8 @@ def drive_all(
     if h.size == 0 or not (h >= 0.0).all():
         what = f"{h.min():.6g} s" if h.size else "no control"
         raise ValueError(f"drive: got {what}, need durations of at least 0 s")
-    for name, step in (("max_step_m", max_step_m), ("max_step_rad", max_step_rad)):
-        if not step > 0.0:
-            raise ValueError(f"drive: {name} must be positive, got {step}")
+    check_range("drive: max_step_m", max_step_m, infinite=True)
+    check_range("drive: max_step_rad", max_step_rad, infinite=True)
     ride, elements = resolved(model, z, u, h)
     return _sampled(model, ride, elements, max_step_m, max_step_rad)
 

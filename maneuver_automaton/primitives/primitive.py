@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, check_fields, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup, group_of
@@ -112,10 +112,7 @@ class Trim:
                 f"trim {self.name!r}: body_velocity turns at {spin:g} rad/s, "
                 f"need at most {FASTEST_SPIN:g} rad/s"
             )
-        if not self.max_duration > 0.0:
-            raise ValueError(
-                f"trim {self.name!r}: max_duration must be positive, got {self.max_duration} s"
-            )
+        check_fields(f"trim {self.name!r}", self, "max_duration", unit="s", infinite=True)
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:
         """Poses after coasting from `start` for `duration` (...,) [s]."""
@@ -155,15 +152,9 @@ class Maneuver:
     def __post_init__(self) -> None:
         plain_numbers(self)
         freeze(self, "displacement", last=(2, 3, 4))
-        if not self.duration >= 0.0:
-            raise ValueError(
-                f"maneuver {self.name!r}: duration must not be negative, got {self.duration} s"
-            )
-        if not 0.0 <= self.cost_multiplier < math.inf:
-            raise ValueError(
-                f"maneuver {self.name!r}: cost_multiplier must be a number of at least 0, got "
-                f"{self.cost_multiplier}"
-            )
+        about = f"maneuver {self.name!r}"
+        check_fields(about, self, "duration", least=0, unit="s", infinite=True)
+        check_fields(about, self, "cost_multiplier", least=0)
         if self.course is None:
             return
         off = max(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton._arrays import plain_numbers
+from maneuver_automaton._arrays import check_fields, plain_numbers
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.primitives import Trim
@@ -33,12 +33,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("step", "time_limit", "look_ahead"):
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
-        if not self.margin >= 0.0:
-            raise ValueError(f"receding horizon: margin must be at least 0, got {self.margin}")
+        about, times = "receding horizon", ("step", "time_limit", "look_ahead")
+        check_fields(about, self, *times, unit="s", infinite=True)
+        check_fields(about, self, "margin", least=0, infinite=True)
+        check_fields(about, self, "stand", least=0, unit="s", infinite=True)
         if self.gap is not None and not 0.0 <= self.gap < 1.0:
             raise ValueError(
                 f"receding horizon: gap must be a share from 0 to below 1, got {self.gap}"
@@ -47,8 +45,6 @@ class Settings:
             raise ValueError(
                 f"receding horizon: pieces must be at least 2, or 0 for none, got {self.pieces}"
             )
-        if not self.stand >= 0.0:
-            raise ValueError(f"receding horizon: stand must be at least 0, got {self.stand} s")
 
     @property
     def continuous(self) -> bool:

@@ -11,7 +11,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, as_number, as_whole, plain_numbers
+from maneuver_automaton._arrays import (
+    Array,
+    as_array,
+    as_number,
+    as_whole,
+    check_fields,
+    check_range,
+    plain_numbers,
+)
 from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.audit import Audit, audit_plan
@@ -60,10 +68,8 @@ class Disturbance:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
+        sizes = ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad")
+        check_fields("disturbance", self, *sizes, least=0)
         if any(not (math.isfinite(one) and one >= 0.0) for one in self.reduced_state or ()):
             raise ValueError(
                 f"disturbance: reduced_state must be numbers of at least 0, got "
@@ -219,8 +225,7 @@ def simulate(
     (True, 35, 2.182)
     """
     step, steps = as_number("step", step), as_whole("steps", steps)
-    if steps < 1:
-        raise ValueError(f"steps must be at least 1, got {steps}")
+    check_range("steps", steps, least=1)
     upset = checked(Disturbance() if disturbance is None else disturbance, problem.start.size)
     controller = RecedingHorizon(
         problem,

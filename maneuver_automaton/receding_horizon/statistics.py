@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, check_range, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import in_parallel
@@ -147,8 +147,7 @@ def simulate_many(
     cases = [(pose, seed) for pose in poses for seed in seeds]
     if not cases:
         raise ValueError(f"got {len(poses)} starts and {len(seeds)} seeds, need one of each")
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    check_range("jobs", jobs, least=1)
     at_once = jobs == 1 and scheduler is None and progress is None
     n_chunks = min(1 if at_once else CHUNKS * max(jobs, 4), len(cases))
     chunks = [[cases[k] for k in part] for part in np.array_split(np.arange(len(cases)), n_chunks)]

@@ -6,7 +6,6 @@ two trims at a time.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,7 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, plain_numbers, wrapped
+from maneuver_automaton._arrays import (
+    Array,
+    IntArray,
+    as_array,
+    check_fields,
+    check_range,
+    freeze,
+    plain_numbers,
+    wrapped,
+)
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
@@ -141,8 +149,7 @@ class FixedHorizon:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        if not (math.isfinite(self.interval) and self.interval > 0.0):
-            raise ValueError(f"fixed horizon: interval must be positive, got {self.interval} s")
+        check_fields("fixed horizon", self, "interval", unit="s")
         if not 1 <= self.applied <= self.intervals:
             raise ValueError(
                 "fixed horizon: applied must be at least 1 and at most the number of intervals, "
@@ -165,12 +172,8 @@ class HorizonSearch:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        if self.width < 1:
-            raise ValueError(f"horizon search: width must be at least 1, got {self.width}")
-        for name in ("growth", "same"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"horizon search: {name} must be at least 0, got {value}")
+        check_fields("horizon search", self, "width", least=1)
+        check_fields("horizon search", self, "growth", "same", least=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,8 +387,7 @@ def simulate_unconstrained(
     >>> loop.settled, loop.poses[:, 0].tolist()
     (True, [0.0, 0.5, 1.0])
     """
-    if steps < 1:
-        raise ValueError(f"steps: got {steps}, need at least 1")
+    check_range("steps", steps, least=1)
     applied, twists = problem.horizon.applied, problem.automaton.body_velocities
     drive = SE2.exp(problem.horizon.interval * twists)
     pose = SE2(as_array("start", start, last=3))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, check_fields, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Obstacle, Polygon
@@ -69,11 +69,7 @@ class Lanelet:
                 )
         for name in ("successors", "beside", "against"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        if self.speed_limit is not None and not self.speed_limit > 0.0:
-            raise ValueError(
-                f"lanelet {self.number}: the speed limit must be positive, got "
-                f"{self.speed_limit} m/s"
-            )
+        check_fields(f"lanelet {self.number}", self, "speed_limit", unit="m/s", infinite=True)
 
     def moved(self, by: LieGroup, *, digits: int | None = None) -> Lanelet:
         """The lanelet moved by a planar pose, its places rounded to `digits` if given."""

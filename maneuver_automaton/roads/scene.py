@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, check_fields, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import AnyShape, Box, Disc, Obstacle, Polygon, Shape, as_shapes
@@ -87,10 +87,7 @@ class RoadScene:
             raise ValueError(f"road scene {self.name!r}: got no lanelet, need at least one")
         if not self.goals:
             raise ValueError(f"road scene {self.name!r}: got no goal, need at least one")
-        if not 0.0 < self.step < math.inf:
-            raise ValueError(
-                f"road scene {self.name!r}: the time step must be positive, got {self.step} s"
-            )
+        check_fields(f"road scene {self.name!r}", self, "step", unit="s")
 
     @property
     def last_time(self) -> float:

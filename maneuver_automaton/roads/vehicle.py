@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, plain_numbers
+from maneuver_automaton._arrays import Array, check_fields, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box
@@ -79,10 +79,8 @@ class RoadVehicle:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        for name in ("length", "width", "power_speed", "engine", "lateral", "friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"road vehicle: {name} must be positive, got {value}")
+        sizes = ("length", "width", "power_speed", "engine", "lateral", "friction")
+        check_fields("road vehicle", self, *sizes)
         if not math.isfinite(self.ahead):
             raise ValueError(f"road vehicle: ahead must be finite, got {self.ahead} m")
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, check_range
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.groups.se2 import chained, coasted
 from maneuver_automaton.words import _kernels_steering as kernels
@@ -232,8 +232,7 @@ def steer(
     end = _shaped("goal", goal, (3,))
     given = np.zeros((2, 3)) if displacements is None else displacements
     steps = _shaped("displacements", given, (2, 3))
-    if not (np.isfinite(tolerance) and tolerance > 0.0):
-        raise ValueError(f"tolerance: got {tolerance}, need a positive number")
+    check_range("tolerance", tolerance)
     branches = kernels.steer_batch(
         np.array(rows), np.arange(3)[None], np.array(steps)[None], np.array(end)[None], tolerance
     )[0]

@@ -173,7 +173,7 @@ def test_many_processes_find_the_same():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"within": 0.0}, "feasible set: the time must be positive, got 0.0 s"),
+        ({"within": 0.0}, "feasible set: within must be positive, got 0.0 s"),
         ({"resolution": -1.0}, "feasible set: resolution must be positive, got -1.0 m"),
         ({"headings": []}, "feasible set: got headings of shape (0,), need (k,)"),
         (

@@ -242,9 +242,9 @@ def test_wrong_input_is_named():
         check_vector_field(unicycle)
     with pytest.raises(ValueError, match=r"f\(x, u\): got shape \(3,\), need 4 components last"):
         check_vector_field(unicycle, region=SECOND_ORDER)
-    with pytest.raises(ValueError, match="samples: got 0, need at least 1"):
+    with pytest.raises(ValueError, match="samples must be at least 1, got 0"):
         check_vector_field(Unicycle(), samples=0)
-    with pytest.raises(ValueError, match=r"tolerance: got 0\.0, need a positive number"):
+    with pytest.raises(ValueError, match=r"tolerance must be positive, got 0\.0"):
         check_vector_field(Unicycle(), tolerance=0.0)
     with pytest.raises(ValueError, match=r"piece_durations: got \(\), need positive times"):
         check_flow(Unicycle(), piece_durations=())

@@ -296,9 +296,9 @@ def test_wrong_numbers_are_refused():
         ),
         (
             lambda: FclChecker((), (), margin=-0.1),
-            "margin must be a number of at least 0, got -0.1 m",
+            "margin must be at least 0, got -0.1 m",
         ),
-        (lambda: FclChecker((), (), proven=0.0), "proven must be a positive number, got 0.0 m"),
+        (lambda: FclChecker((), (), proven=0.0), "proven must be positive, got 0.0 m"),
     ]:
         with pytest.raises(ValueError) as error:
             call()

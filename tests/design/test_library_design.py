@@ -137,8 +137,8 @@ def test_the_library_plans_as_the_proof_says():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"within": 0.9}, "within must be a factor of at least 1, got 0.9"),
-        ({"most": 0}, "most must be at least 1 trim, got 0"),
+        ({"within": 0.9}, "within must be at least 1, got 0.9"),
+        ({"most": 0}, "most must be at least 1, got 0"),
         ({"max_trims": 2, "radius": 5.0}, "max_trims must be at least 3"),
         ({"max_trims": 4}, "radius: max_trims needs a radius of goals"),
         ({"max_trims": 4, "radius": -1.0}, "radius must be positive, got -1.0 m"),

@@ -153,7 +153,7 @@ def test_the_last_arrival_may_be_what_counts():
     [
         ({"names": ["a", "a"]}, "two vehicles have the name 'a'"),
         ({"names": ["a"]}, "got 1 names, need one for each of 2 vehicles"),
-        ({"margin": -1.0}, "margin must be a number of at least 0, got -1.0 m"),
+        ({"margin": -1.0}, "margin must be at least 0, got -1.0 m"),
     ],
 )
 def test_bad_fleets_are_refused(change, message):

@@ -380,7 +380,7 @@ def test_what_lattices_cannot_state():
     turned = automaton_of_lattice(Lattice(resolution=1.0, headings=[0.5], moves=(uneven,)))
     with pytest.raises(InvalidLibrary, match="its headings are not evenly spaced"):
         mprim_of_automaton(turned)
-    with pytest.raises(ValueError, match="speed and turn_rate must be positive"):
+    with pytest.raises(ValueError, match="speed must be positive"):
         automaton_of_lattice(Lattice(resolution=1.0, headings=[0.0], moves=()), speed=0.0)
 
 

@@ -84,7 +84,7 @@ def test_none_is_longer_than_that_of_nav2(name):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"resolution": 0.0, "turning_radius": 1.0}, "must be positive, got 0.0 m and 1.0 m"),
+        ({"resolution": 0.0, "turning_radius": 1.0}, "resolution must be positive, got 0.0 m"),
         ({"resolution": 0.01, "turning_radius": 3.0}, "are 300 cells of 0.01 m, need at most 200"),
     ],
 )

@@ -14,7 +14,7 @@ def test_one_class_for_each_dimension():
     assert translations(2) is not translations(3)
     assert translations(3).coordinates == ("x", "y", "z")
     assert translations(4).coordinates == ("x1", "x2", "x3", "x4")
-    with pytest.raises(ValueError, match="translations: got n = 0, need at least 1"):
+    with pytest.raises(ValueError, match="translations: n must be at least 1, got 0"):
         translations(0)
 
 

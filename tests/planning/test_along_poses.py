@@ -254,7 +254,7 @@ def test_a_pose_just_before_the_end_of_a_turn_is_passed(last):
     ("make", "said"),
     [
         (lambda: ma.Via(), "via: has neither a pose nor a gate"),
-        (lambda: ma.Via([0, 0, 0], stay_s=-1), "via: stay_s must be a number of at least 0"),
+        (lambda: ma.Via([0, 0, 0], stay_s=-1), "via: stay_s must be at least 0"),
         (lambda: ma.Via(gate=[[1, 1], [1, 1]]), "need two places"),
         (lambda: ma.Via([5, 0, 0], gate=[[1, -1], [1, 1]]), "beside the gate"),
         (lambda: ma.Problem(ROBOT, START, GOAL, order="best"), "order must be one of"),

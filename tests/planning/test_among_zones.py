@@ -167,6 +167,6 @@ def test_a_zone_that_forbids_nothing_is_refused():
     assert str(error.value).startswith("zone: forbids nothing, need max_speed")
     with pytest.raises(ValueError) as error:
         Zone(shape=ACROSS, max_speed=-1.0)
-    assert str(error.value) == "zone: max_speed must be a number of at least 0, got -1.0"
+    assert str(error.value) == "zone: max_speed must be at least 0, got -1.0"
     with pytest.raises(LookupError):
         posed(ALONG, Zone(shape=ACROSS, trims=["slw"]))

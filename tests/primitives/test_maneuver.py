@@ -27,8 +27,8 @@ def test_the_displacement_is_a_read_only_copy():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"duration": -0.5}, "maneuver 'brake': duration must not be negative, got -0.5 s"),
-        ({"duration": math.nan}, "maneuver 'brake': duration must not be negative, got nan s"),
+        ({"duration": -0.5}, "maneuver 'brake': duration must be at least 0, got -0.5 s"),
+        ({"duration": math.nan}, "maneuver 'brake': duration must be at least 0, got nan s"),
         ({"displacement": [1.0]}, "displacement: got shape (1,), need 2 or 3 or 4 components last"),
         ({"displacement": [0, 0, math.inf]}, "displacement: got inf, need finite numbers"),
     ],

@@ -299,7 +299,7 @@ class TestDisturbances:
         [
             ({"position_m": -1.0}, "position_m must be at least 0, got -1.0"),
             ({"heading_rad": math.nan}, "heading_rad must be at least 0, got nan"),
-            ({"measured_position_m": math.inf}, "measured_position_m must be at least 0, got inf"),
+            ({"measured_position_m": math.inf}, "measured_position_m must be finite, got inf"),
             ({"delay": 2}, "delay must be 0 or 1 steps, got 2"),
             ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
         ],

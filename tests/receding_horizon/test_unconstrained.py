@@ -253,7 +253,7 @@ def test_headings_count_modulo_a_turn_from_the_start():
         ),
         (
             lambda: simulate_unconstrained(problem_of(even(3), MIXED), PARKING, steps=0),
-            "steps: got 0, need at least 1",
+            "steps must be at least 1, got 0",
         ),
     ],
 )

@@ -82,7 +82,7 @@ def test_rounding_leaves_no_gap():
 
 
 def test_a_scene_needs_a_time_step():
-    with pytest.raises(ValueError, match=r"the time step must be positive, got 0\.0 s"):
+    with pytest.raises(ValueError, match=r"step must be positive, got 0\.0 s"):
         replace(scene([straight(1, 0.0)]), step=0.0)
 
 

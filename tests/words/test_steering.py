@@ -183,12 +183,12 @@ def test_scaling_lengths_scales_straights_and_keeps_angles(size):
             {"displacements": [[0, 0, 0]]},
             r"displacements: got shape \(1, 3\), need \(2, 3\)",
         ),
-        ([LEFT] * 3, [1, 0, 0], {"tolerance": 0.0}, "tolerance: got 0.0, need a positive number"),
+        ([LEFT] * 3, [1, 0, 0], {"tolerance": 0.0}, "tolerance must be positive, got 0.0"),
         (
             [LEFT] * 3,
             [1, 0, 0],
             {"tolerance": np.inf},
-            "tolerance: got inf, need a positive number",
+            "tolerance must be finite, got inf",
         ),
     ],
 )
