@@ -6,10 +6,8 @@ from maneuver_automaton.analysis.coverage import Reached as Reached
 from maneuver_automaton.analysis.coverage import ReachSettings as ReachSettings
 from maneuver_automaton.analysis.coverage import StretchFactor as StretchFactor
 from maneuver_automaton.analysis.coverage import dispersion as dispersion
-from maneuver_automaton.analysis.coverage import planned as planned
 from maneuver_automaton.analysis.coverage import reached as reached
 from maneuver_automaton.analysis.coverage import settings_for as settings_for
-from maneuver_automaton.analysis.coverage import straight_line as straight_line
 from maneuver_automaton.analysis.coverage import stretch_factor as stretch_factor
 from maneuver_automaton.analysis.examine import Region as Region
 from maneuver_automaton.analysis.examine import SymmetryReport as SymmetryReport
@@ -41,6 +39,5 @@ from maneuver_automaton.analysis.turnpike import turnpike as turnpike
 from maneuver_automaton.refinement.retiming import EffortReport as EffortReport
 from maneuver_automaton.refinement.retiming import Retiming as Retiming
 from maneuver_automaton.refinement.retiming import effort_report as effort_report
-from maneuver_automaton.refinement.retiming import effort_threshold as effort_threshold
 from maneuver_automaton.refinement.retiming import retime as retime
 from maneuver_automaton.refinement.shooting import least_effort as least_effort

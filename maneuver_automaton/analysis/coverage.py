@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, check_fields, plain_numbers, wrapped
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import LatticeBody
-from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice_library import path_length
 
 EVEN = 16  # the number of bins of headings is a multiple: usual headings lie within, not between
@@ -187,12 +185,6 @@ def _followers(nodes: _Nodes, steps: dict[int, _Nodes], settings: ReachSettings)
     return parts
 
 
-REFERENCE_S = 0.2  # for the plan of a reference to a pose
-
-Reference = Callable[[Array], float]
-"""Least cost from the origin to a pose (3,) [m, m, rad], inf if it cannot be reached."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoverageSettings:
     """Where poses are drawn, how far apart they are, and which words may reach them."""
@@ -224,7 +216,7 @@ class Dispersion:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StretchFactor:
-    """By how much the library detours at most, against a reference."""
+    """By how much the library detours at most, against a body that drives and turns any way."""
 
     largest: float
     median: float
@@ -293,13 +285,9 @@ def dispersion(
 
 
 def stretch_factor(
-    automaton: Automaton,
-    *,
-    reference: Reference | None = None,
-    start: str | None = None,
-    settings: CoverageSettings | None = None,
+    automaton: Automaton, *, settings: CoverageSettings | None = None
 ) -> StretchFactor:
-    """The t by which the library spans what it reaches: its cost over that of a reference, at most.
+    """The t by which the library spans what it reaches: its cost over `straight_costs`, at most.
 
     Poses are those at which words of the library end within the ball, next to the samples of a
     Halton sequence; a pose at the origin is left out. A library t-spans a lattice if t times the
@@ -312,10 +300,6 @@ def stretch_factor(
     ----------
     automaton : Automaton
         The library, of a vehicle in the plane.
-    reference : callable, optional
-        Least cost to a pose; `straight_line` of the library if None, which no motion beats.
-    start : str, optional
-        Trim at the origin; rest if None.
     settings : CoverageSettings, optional
         Ball, number of pairs, and the words that count.
 
@@ -332,8 +316,7 @@ def stretch_factor(
     True
     """
     settings = settings or CoverageSettings()
-    words = _at_rest(automaton, reached(automaton, start=start, settings=settings.reach))
-    least = reference or straight_line(automaton, measure=settings.reach.measure)
+    words = _at_rest(automaton, reached(automaton, settings=settings.reach))
     inside = np.linalg.norm(words.poses[:, :2], axis=1) <= settings.radius
     inside &= words.costs > 0.0
     if not inside.any():
@@ -345,34 +328,38 @@ def stretch_factor(
     samples = poses_in_ball(settings.radius, settings.pairs, seed=settings.seed)
     _, chosen = _nearest(poses, samples, settings.metres_per_radian)
     chosen = np.unique(chosen)
-    references = np.array([least(pose) for pose in poses[chosen]])
-    known = np.isfinite(references) & (references > 0.0)
-    if not known.any():
-        raise ValueError("stretch factor: the reference reaches none of the poses")
-    ratios = costs[chosen][known] / references[known]
+    least = straight_costs(automaton, poses[chosen], measure=settings.reach.measure)
+    known = np.isfinite(least) & (least > 0.0)
+    chosen = chosen[known]
+    if not chosen.size:
+        raise ValueError("stretch factor: no pose that was reached is away from the origin")
+    ratios = costs[chosen] / least[known]
     worst = int(ratios.argmax())
-    x, y, heading = poses[chosen][known][worst]
+    x, y, heading = poses[chosen][worst]
     return StretchFactor(
         largest=float(ratios[worst]),
         median=float(np.median(ratios)),
         pose=np.array([x, y, wrapped(heading)]),
-        pairs=int(known.sum()),
+        pairs=len(chosen),
     )
 
 
-def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
-    """The least cost of a body that drives and turns in all directions as fast as the library does.
+def straight_costs(automaton: Automaton, poses: Array, *, measure: str = "time") -> Array:
+    """Least costs (n,) of a body that drives and turns any way as fast as the library does.
 
-    It is a lower bound for every vehicle: the distance, or the longer of the times for the distance
-    and for the turn.
+    They are lower bounds for every vehicle: the distance, or the longer of the times for the
+    distance and for the turn.
 
     Examples
     --------
     >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (2, 0), "left": (0, 1)})
-    >>> straight_line(robot)(np.array([3.0, 4.0, 0.1]))
-    2.5
+    >>> straight_costs(robot, np.array([[3.0, 4.0, 0.1]])).tolist()
+    [2.5]
     """
+    distances, turns = np.hypot(poses[:, 0], poses[:, 1]), np.abs(wrapped(poses[:, 2]))
+    if measure == "length":
+        return distances
     twists = [trim.body_velocity for trim in automaton.trims]
     for maneuver in automaton.maneuvers:
         if maneuver.course is not None:
@@ -380,48 +367,10 @@ def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
             twists.extend(automaton.model.body_velocity(course.reduced_state, course.control))
         elif maneuver.duration > 0.0:
             twists.append(maneuver.displacement / maneuver.duration)
-    table = np.array(twists)
-    speed = float(np.hypot(table[:, 0], table[:, 1]).max())
-    turn_rate = float(np.abs(table[:, 2]).max())
-
-    def least(pose: Array) -> float:
-        distance = float(np.hypot(pose[0], pose[1]))
-        if measure == "length":
-            return distance
-        turn = abs(math.remainder(pose[2], 2.0 * math.pi))
-        times = [
-            amount / rate if rate else (math.inf if amount else 0.0)
-            for amount, rate in ((distance, speed), (turn, turn_rate))
-        ]
-        return max(times)
-
-    return least
-
-
-def planned(automaton: Automaton, *, measure: str = "time") -> Reference:
-    """The cost of the plan that a reference library finds in free space, for each pose.
-
-    For few trims all words are searched, so the plan is the best; for many it may be costlier than
-    that, and a stretch factor against it too small.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> dubins = Automaton.of_controls(
-    ...     Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
-    >>> round(planned(dubins)(np.array([0.0, 2.0, np.pi])), 6)
-    3.141593
-    """
-    cost = Cost(time=1.0) if measure == "time" else Cost(length=1.0)
-    origin = np.zeros(automaton.model.group.dof)
-
-    def least(pose: Array) -> float:
-        from maneuver_automaton.planning import plan
-
-        result = plan(Problem(automaton, origin, pose, cost=cost), time_limit=REFERENCE_S)
-        return math.inf if result.cost is None else float(result.cost)
-
-    return least
+    speeds, turn_rates = np.hypot(*np.array(twists).T[:2]), np.abs(np.array(twists)[:, 2])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times = (distances / speeds.max(), turns / turn_rates.max())
+    return np.asarray(np.fmax(*times))  # nothing to do takes no time
 
 
 def poses_in_ball(radius: float, count: int, *, seed: int) -> Array:

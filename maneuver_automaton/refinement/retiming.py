@@ -94,25 +94,6 @@ def effort_report(
     )
 
 
-def effort_threshold(limits: ArrayLike, effort_matrix: ArrayLike | None = None) -> float:
-    """r*: the greatest r for which all controls with ``|u|_R^2 <= r`` are within the limits.
-
-    An optimal control has uniform effort or, wherever it has not, an effort of at least r*.
-
-    Source: the paper, Cor. 19; the ellipsoid ``|u|_R^2 <= r`` is ``sqrt(r (R^-1)_jj)`` wide.
-
-    Examples
-    --------
-    >>> effort_threshold([[-2.0, 2.0], [-1.0, 3.0]])
-    1.0
-    """
-    box = np.asarray(limits, dtype=np.float64)
-    matrix = _matrix(effort_matrix)
-    widths = np.ones(len(box)) if matrix is None else np.diag(np.linalg.inv(matrix))
-    nearest = np.maximum(np.minimum(-box[:, 0], box[:, 1]), 0.0)
-    return float(np.min(nearest * nearest / widths, initial=np.inf))
-
-
 def moving_trims(plan: Plan) -> np.ndarray[tuple[int, ...], np.dtype[np.bool]]:
     """Which trims (n,) change the pose; the others are rests, or last no time."""
     still = np.array([trim.is_rest for trim in plan.trims], dtype=np.bool)
@@ -144,9 +125,6 @@ class Retiming:
     after: Plan  # without the rests of the plan before
     paces: Array  # (n,) factor of the control of each trim left
     at_limit: tuple[bool, ...]  # which of them a limit keeps from going faster
-    effort_before: EffortReport
-    effort_after: EffortReport
-    threshold: float  # r*: below this effort no limit can be active
     cost_before: float
     cost_after: float
 
@@ -237,9 +215,6 @@ def retime(
         after=after,
         paces=paces,
         at_limit=tuple(at_limit.tolist()),
-        effort_before=effort_report(plan, terms.effort_matrix),
-        effort_after=effort_report(after, terms.effort_matrix),
-        threshold=effort_threshold(box, terms.effort_matrix),
         cost_before=_cost(plan, cost),
         cost_after=_cost(after, cost),
     )
