@@ -75,9 +75,9 @@ def of_vehicle(problem: Problem) -> Iterator[Finding]:
     report = analysis.check_library(twists, max_trims=problem.horizon.max_trims)
     missing = f"sufficient, not necessary, to reach every pose: {'; '.join(report.missing)}"
     yield Finding(
-        what="library: turn, move, turn",
+        "library: turn, move, turn",
+        report.message if report.holds else missing,
         holds=True if report.holds else None,
-        words=report.message if report.holds else missing,
     )
 
 
@@ -89,9 +89,8 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
     yield _found("stage cost", analysis.check_stage_cost(_stage_cost(problem), region=region))
     for kind in dict.fromkeys(type(cost).__name__ for cost in problem.place_costs):
         yield Finding(
-            what="symmetry: place cost",
-            holds=None,
-            words=f"{kind} depends on the place; the vehicle and the rest of its cost do not",
+            "symmetry: place cost",
+            f"{kind} depends on the place; the vehicle and the rest of its cost do not",
         )
     bounds = problem.bounds
     named = (("x", bounds.x), ("y", bounds.y), ("z", bounds.z))
@@ -119,10 +118,10 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
 
 def _found(what: str, report: SymmetryReport) -> Finding:
     return Finding(
-        what=f"symmetry: {what}",
+        f"symmetry: {what}",
+        f"invariant under {listed(report.intact)}" if report.holds else report.message,
         holds=report.holds,
         worst=report.worst_violation,
-        words=f"invariant under {listed(report.intact)}" if report.holds else report.message,
     )
 
 
@@ -130,10 +129,9 @@ def _of_given(what: str, report: SymmetryReport, *, hint: str) -> Finding:
     if report.holds:
         return _found(what, report)
     return Finding(
-        what=f"symmetry: {what}",
-        holds=None,
+        f"symmetry: {what}",
+        f"not invariant under {listed(report.broken)}: {hint}",
         worst=report.worst_violation,
-        words=f"not invariant under {listed(report.broken)}: {hint}",
     )
 
 
@@ -156,17 +154,17 @@ def _automaton(automaton: Automaton) -> Iterator[Finding]:
     sound = report.connected and not (report.dead_ends or report.unused)
     lines = report_lines(report)
     yield Finding(
-        what="automaton: connected",
+        "automaton: connected",
+        "every trim can be reached from every trim" if sound else "; ".join(lines[1:]),
         holds=sound,
-        words="every trim can be reached from every trim" if sound else "; ".join(lines[1:]),
     )
     if report.duplicates:
         words = "; ".join(few(names, 8) for names in report.duplicates[:5])
-        yield Finding(what="automaton: no trim twice", holds=None, words=f"equal twists: {words}")
+        yield Finding("automaton: no trim twice", f"equal twists: {words}")
     yield Finding(
-        what="automaton: reaches every pose of free space",
+        "automaton: reaches every pose of free space",
+        lines[0],
         holds=True if report.controllable else None,
-        words=lines[0],
     )
 
 
@@ -188,11 +186,11 @@ def _trims(automaton: Automaton) -> Finding:
     defect = np.abs(driven - np.concatenate([expected, reduced], axis=1)).max(axis=1)
     worst = int(defect.round(12).argmax())  # of equal ones the first: rounding is the machine's
     return Finding(
-        what="automaton: trims follow the model",
+        "automaton: trims follow the model",
+        f"{len(trims)} trims driven for {TRIM_SECONDS:g} s by an ODE solver, "
+        f"worst {trims[worst].name!r}",
         holds=bool(defect.max() <= TRIM_TOLERANCE),
         worst=float(defect.max()),
-        words=f"{len(trims)} trims driven for {TRIM_SECONDS:g} s by an ODE solver, "
-        f"worst {trims[worst].name!r}",
     )
 
 
@@ -207,28 +205,25 @@ def of_ends(problem: Problem) -> Iterator[Finding]:
         outside = {name: float(value) for name, value in excess.items() if value > 0.0}
         words = "outside in " + ", ".join(outside) if outside else "inside"
         yield Finding(
-            what=f"{what}: inside the bounds",
+            f"{what}: inside the bounds",
+            words if known else "there are none",
             holds=not outside,
             worst=max(outside.values()) if outside else None,
-            words=words if known else "there are none",
         )
     if problem.footprint:  # how far it reaches shows a reference that is on the wrong side
         parts = parts_of(problem.footprint)
         low = np.min([np.array(part.core.bounds[:2]) - part.radius for part in parts], axis=0)
         high = np.max([np.array(part.core.bounds[2:]) + part.radius for part in parts], axis=0)
         yield Finding(
-            what="body: seen from the pose",
-            holds=None,
-            words=f"{-low[0]:.6g} m behind to {high[0]:.6g} m ahead, "
+            "body: seen from the pose",
+            f"{-low[0]:.6g} m behind to {high[0]:.6g} m ahead, "
             f"{-low[1]:.6g} m right to {high[1]:.6g} m left",
         )
     touched = [("start", problem.start, problem.start_time)]
     touched += [("goal", one.pose, math.inf) for one in problem.goals if not one.free_heading]
     for what, pose, time in touched if problem.obstacles else ():
         words = where_touched(problem, pose, time)
-        yield Finding(
-            what=f"{what}: keeps clear of obstacles", holds=not words, words=words or "it does"
-        )
+        yield Finding(f"{what}: keeps clear of obstacles", words or "it does", holds=not words)
 
 
 def _feasibility(problem: Problem, time_limit: float) -> Finding:
@@ -241,7 +236,7 @@ def _feasibility(problem: Problem, time_limit: float) -> Finding:
     elif result.status is PlanStatus.OUT_OF_BUDGET:
         words = f"not known: {result.reason}, which does not prove that there is none"
     found = None if result.status in UNDECIDED else result.status is PlanStatus.FOUND
-    return Finding(what="goal: can be reached", holds=found, words=words)
+    return Finding("goal: can be reached", words, holds=found)
 
 
 # -- several vehicles
@@ -256,7 +251,7 @@ def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
     for alike in kinds.values():
         names = few([*alike], 3)
         for one in of_vehicle(next(iter(alike.values()))):
-            yield one if len(kinds) == 1 else replace(one, what=f"{names}: {one.what}")
+            yield one if len(kinds) == 1 else one._replace(what=f"{names}: {one.what}")
     yield from _ends(fleet)
     yield _apart("starts", fleet)
     at_goals = [  # those that stay at one goal of one heading, standing there
@@ -281,9 +276,9 @@ def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
     found = result.status is FleetStatus.FOUND
     n = len(fleet)
     yield Finding(
-        what="goals: can be reached",
+        "goals: can be reached",
+        f"plans of all {n} vehicles exist" if found else f"not known: {reason_of(result)}",
         holds=True if found else None,
-        words=f"plans of all {n} vehicles exist" if found else f"not known: {reason_of(result)}",
     )
 
 
@@ -296,10 +291,10 @@ def _ends(fleet: FleetProblem) -> Iterator[Finding]:
     for what, its in found.items():
         wrong = [(name, one) for name, one in its if one.holds is False]
         for name, one in wrong:
-            yield replace(one, what=f"{name}: {what}")
+            yield one._replace(what=f"{name}: {what}")
         if not wrong:
             words = {one.words: None for _, one in its}
-            yield replace(its[0][1], what=what, words="; ".join(words))
+            yield its[0][1]._replace(what=what, words="; ".join(words))
 
 
 def _apart(what: str, fleet: FleetProblem) -> Finding:
@@ -307,14 +302,11 @@ def _apart(what: str, fleet: FleetProblem) -> Finding:
     verdict = verify_fleet(fleet, {})
     if not verdict.too_near:
         least = min((one.distance_m for one in verdict.closest), default=None)
-        return Finding(what=f"{what}: are apart", holds=True, worst=least, words="every pair is")
+        return Finding(f"{what}: are apart", "every pair is", holds=True, worst=least)
     said = "; ".join(
         f"{' and '.join(one.pair)} are {one.distance_m:.3g} m apart" for one in verdict.too_near[:5]
     )
     more = f", need more than {fleet.margin:g} m" if fleet.margin else ", which touch"
     return Finding(
-        what=f"{what}: are apart",
-        holds=False,
-        worst=verdict.too_near[0].distance_m,
-        words=said + more,
+        f"{what}: are apart", said + more, holds=False, worst=verdict.too_near[0].distance_m
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,14 +39,13 @@ THERE = 1e-9  # [m, rad] between a start and where a vehicle begins
 NEARER = 1e-6  # [m] by which a distance may be below that of the file
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class Finding(NamedTuple):
     """One line of the report; `holds` is None for a fact that is not judged."""
 
     what: str
-    holds: bool | None
-    worst: float | None = None
     words: str
+    holds: bool | None = None
+    worst: float | None = None
 
 
 def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, list[Finding]] | None:
@@ -85,9 +84,7 @@ def _plans(path: Path, document: Mapping[str, Any], fleet: FleetProblem) -> list
     rows = [
         _plan(f"{name}: plan", verdict.verdicts[name], stated[name].get("cost"))
         if name in verdict.verdicts
-        else Finding(
-            what=f"{name}: plan", holds=False, words=_why_none(stated.get(name, {}).get("reason"))
-        )
+        else Finding(f"{name}: plan", _why_none(stated.get(name, {}).get("reason")), holds=False)
         for name in fleet.names
     ]
     return [*rows, *_pairs(verdict.closest, verdict.too_near)]
@@ -97,22 +94,22 @@ def _on_road(result: RoadFleetResult) -> Iterator[Finding]:
     """What the judge says of each drive past the others, and whether it ends at a goal."""
     for name, one in result.results.items():
         if one.plan is None or one.verdict is None:
-            yield Finding(what=f"{name}: plan", holds=False, words=_why_none(one.reason))
+            yield Finding(f"{name}: plan", _why_none(one.reason), holds=False)
             continue
         scene, verdict = one.planner.scene, one.verdict
         said = "; ".join(words for _, words in verdict.faults)
         yield Finding(
-            what=f"{name}: driven",
+            f"{name}: driven",
+            said or f"to the edge of the road {verdict.edge_m:.3g} m",
             holds=verdict.clean,
             worst=None if math.isinf(verdict.clearance_m) else verdict.clearance_m,
-            words=said or f"to the edge of the road {verdict.edge_m:.3g} m",
         )
         end = one.plan.start_time + one.plan.duration
         middle = one.planner.vehicle.middle_of(one.plan.end)
         speed = float(one.plan.trims[-1].reduced_state[0])
         there = any(goal.contains(middle, speed=speed, time=end) for goal in scene.goals)
         words = f"reached at {end:.6g} s" if there else one.reason or "it ends elsewhere"
-        yield Finding(what=f"{name}: goal", holds=there, words=words)
+        yield Finding(f"{name}: goal", words, holds=there)
     near = tuple(one for one in result.pairs if one.distance_m <= too_close(0.0))
     yield from _pairs(result.pairs, near)
 
@@ -125,13 +122,13 @@ def _pairs(closest: Sequence[Closest], too_near: Sequence[Closest]) -> list[Find
             one = closest[0]
             words = f"nearest are {' and '.join(one.pair)} at {one.time_s:.4g} s"
         least = closest[0].distance_m if closest else None
-        return [Finding(what="every pair: apart", holds=True, worst=least, words=words)]
+        return [Finding("every pair: apart", words, holds=True, worst=least)]
     return [
         Finding(
-            what=f"{' and '.join(one.pair)}: apart",
+            f"{' and '.join(one.pair)}: apart",
+            f"{one.distance_m:.3g} m at {one.time_s:.4g} s",
             holds=False,
             worst=one.distance_m,
-            words=f"{one.distance_m:.3g} m at {one.time_s:.4g} s",
         )
         for one in too_near
     ]
@@ -140,11 +137,11 @@ def _pairs(closest: Sequence[Closest], too_near: Sequence[Closest]) -> list[Find
 def _plan(what: str, verdict: Verdict, stated: Any) -> Finding:
     """What holds of a plan, and whether it costs what its file says."""
     if not verdict.passed:
-        return Finding(what=what, holds=False, words=verdict.reason)
+        return Finding(what, verdict.reason, holds=False)
     same = _agrees(stated, verdict.cost)
     clearance = None if verdict.audit is None else verdict.audit.min_clearance_m
     words = f"cost {verdict.cost:.9g}" + ("" if same else f", but the file says {stated}")
-    return Finding(what=what, holds=same, worst=clearance, words="; ".join([words, *verdict.notes]))
+    return Finding(what, "; ".join([words, *verdict.notes]), holds=same, worst=clearance)
 
 
 def _why_none(reason: str | None) -> str:
@@ -199,9 +196,9 @@ def _on_the_way(loop: ClosedLoop) -> Iterator[Finding]:
     left = still_ahead(problem, passed)
     named = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed if not one.stay_left)
     yield Finding(
-        what="vehicle: on the way",
+        "vehicle: on the way",
+        f"passed {named or 'nothing'}" + (f", {len(left)} left" if left else ""),
         holds=None if any(step.off_plan for step in loop.steps) else not (left and loop.reached),
-        words=f"passed {named or 'nothing'}" + (f", {len(left)} left" if left else ""),
     )
 
 
@@ -223,9 +220,9 @@ def _loop(path: Path, document: Mapping[str, Any], log: FleetLog) -> list[Findin
         broken = {one["step"] for one in document["broken_guarantees"]}
         rows.append(
             Finding(
-                what="guarantees: as the file says",
+                "guarantees: as the file says",
+                f"broken in {len(broken)} steps" if broken else "hold in every step",
                 holds=not broken,
-                words=f"broken in {len(broken)} steps" if broken else "hold in every step",
             )
         )
         return rows
@@ -239,7 +236,7 @@ def _vehicle(
     if not pieces:
         claims = name in log.arrived_s
         words = "it was never there" + (", but the file says that it arrived" if claims else "")
-        yield Finding(what=f"{name}: driven", holds=False if claims else None, words=words)
+        yield Finding(f"{name}: driven", words, holds=False if claims else None)
         return
     cost = math.fsum(log.costs_of(name).values())
     off = float(np.abs(pieces[0].start - problem.start).max())
@@ -257,10 +254,10 @@ def _vehicle(
         if bad
     ]
     yield Finding(
-        what=f"{name}: driven",
+        f"{name}: driven",
+        "; ".join([f"cost {cost:.9g}{beside}", *wrong]),
         holds=not wrong,
         worst=None if math.isinf(clearance) else clearance,
-        words="; ".join([f"cost {cost:.9g}{beside}", *wrong]),
     )
     yield _ended(log, name, problem, stated)
 
@@ -273,12 +270,12 @@ def _ended(log: FleetLog, name: str, problem: Problem, stated: Mapping[str, Any]
     what, arrived = f"{name}: goal", log.arrived_s.get(name)
     if arrived is None:
         broken = name in log.broken_down
-        return Finding(what=what, holds=None if broken else False, words=str(stated["status"]))
+        return Finding(what, str(stated["status"]), holds=None if broken else False)
     off = float(np.abs(pose - driven).max())
     if off > THERE and not any(within(driven, goal) for goal in problem.goals):
-        return Finding(what=what, holds=False, worst=off, words="what was driven ends elsewhere")
+        return Finding(what, "what was driven ends elsewhere", holds=False, worst=off)
     words = f"reached at {arrived:.6g} s" if there else "the file says so, but it is elsewhere"
-    return Finding(what=what, holds=there, words=words)
+    return Finding(what, words, holds=there)
 
 
 def _together(log: FleetLog, verdict: DrivenVerdict, stated: float | None) -> Iterator[Finding]:
@@ -288,24 +285,23 @@ def _together(log: FleetLog, verdict: DrivenVerdict, stated: float | None) -> It
     for row in near:
         # Disturbances may use up what plans keep, but not more.
         yield Finding(
-            what=f"{' and '.join(row.pair)}: apart",
+            f"{' and '.join(row.pair)}: apart",
+            f"{row.distance_m:.6g} m at {row.time_s:.5g} s, plans keep {log.problem.margin:g} m",
             holds=False if undisturbed or row.distance_m <= 0.0 else None,
             worst=row.distance_m,
-            words=f"{row.distance_m:.6g} m at {row.time_s:.5g} s, plans keep "
-            f"{log.problem.margin:g} m",
         )
     if not near:
         nearest = verdict.closest[:1]
         yield Finding(
-            what="every pair: apart",
+            "every pair: apart",
+            pair_text(nearest[0]) if nearest else "there is none that comes near",
             holds=True,
             worst=nearest[0].distance_m if nearest else None,
-            words=pair_text(nearest[0]) if nearest else "there is none that comes near",
         )
     if verdict.distance_m < (math.inf if stated is None else stated) - NEARER:
         yield Finding(
-            what="least distance: as the file says",
+            "least distance: as the file says",
+            f"but the file says {stated}",
             holds=False,
             worst=verdict.distance_m,
-            words=f"but the file says {stated}",
         )
