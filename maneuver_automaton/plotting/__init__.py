@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
     from maneuver_automaton.plotting.automata import save_maneuvers_figure as save_maneuvers_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
-    from maneuver_automaton.plotting.controls import draw_controls as draw_controls
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
     from maneuver_automaton.plotting.look import Look as Look

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.text import Text
 
@@ -35,25 +36,18 @@ ROOM = 1.35  # side of a panel, over the size of what is in it
 DART_SIZE = 0.075  # of the side of a panel
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ManeuverArtists:
-    """Artists of `draw_maneuvers`: a path for each maneuver, darts at start and ends."""
-
-    paths: LineCollection
-    darts: PolyCollection
-
-
-def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
+def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> dict[str, Any]:
     """Draw `maneuvers` on `ax`, to scale from the origin, which heads right.
 
     The colour of a path tells its change of heading: orange to the left, blue to the right, grey
-    for none. Dots are a second apart. A motion that is not known is a dashed straight line.
+    for none. Dots are a second apart. A motion that is not known is a dashed straight line. The
+    artists by what they show: paths, and darts at the start and the ends.
 
     Examples
     --------
     >>> from matplotlib.figure import Figure
     >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1.0, 0.0, 0.0])
-    >>> len(draw_maneuvers(Figure().add_subplot(), [go]).paths.get_segments())
+    >>> len(draw_maneuvers(Figure().add_subplot(), [go])["paths"].get_segments())
     1
     """
     courses = [_poses(maneuver) for maneuver in maneuvers]
@@ -86,7 +80,7 @@ def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
         zorder=3.5,
     )  # fmt: skip
     _frame(ax, center, half)
-    return ManeuverArtists(paths=paths, darts=darts)
+    return {"paths": paths, "darts": darts}
 
 
 def save_maneuvers_figure(
@@ -212,31 +206,20 @@ RAY, LEAST_LENGTH = 0.27, 6  # of the side of a graph, and characters, for a nam
 RING = 4.2  # [in] of a ring of nodes whose names stick out
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class AutomatonArtists:
-    """Artists of `draw_automaton`; a graph has no `points`, points have `switches` besides."""
-
-    nodes: PolyCollection | None = None  # a disc for each trim
-    motions: LineCollection | None = None  # one second of each trim, in its disc
-    switches: LineCollection | None = None  # between trims that switch at will; or by a maneuver
-    maneuvers: tuple[FancyArrowPatch, ...] = ()
-    names: tuple[Text, ...] = ()
-    points: PathCollection | None = None  # turn rate and speed of each trim
-
-
-def draw_automaton(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+def draw_automaton(ax: Axes, automaton: Automaton) -> dict[str, Any]:
     """Draw an `automaton` on `ax`.
 
     Up to thirty trims are nodes of a graph, each with a picture of one second of its motion;
     thin lines join trims that switch at will, arrows are maneuvers. More trims are points over
-    turn rate and speed, joined by lines where there are maneuvers.
+    turn rate and speed, joined by lines where there are maneuvers. The artists by what they show:
+    nodes, motions, switches, maneuvers and names of a graph, else points and switches.
 
     Examples
     --------
     >>> from matplotlib.figure import Figure
     >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
-    >>> [text.get_text() for text in draw_automaton(Figure().add_subplot(), robot).names]
+    >>> [text.get_text() for text in draw_automaton(Figure().add_subplot(), robot)["names"]]
     ['rest', 'ahead']
     """
     if len(automaton) > MOST_NODES:
@@ -330,7 +313,7 @@ def _colors(automaton: Automaton) -> list[Color]:
     return [named[name] for name in automaton.trim_names]
 
 
-def _draw_points(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+def _draw_points(ax: Axes, automaton: Automaton) -> dict[str, Any]:
     twists = automaton.body_velocities
     points = ax.scatter(
         twists[:, 2], twists[:, 0], s=min(26.0, 9000.0 / len(automaton)), c=_colors(automaton),
@@ -347,10 +330,10 @@ def _draw_points(ax: Axes, automaton: Automaton) -> AutomatonArtists:
     )  # fmt: skip
     ax.add_collection(switches)
     tidy(ax, x="turn rate [rad/s]", y="speed ahead [m/s]")
-    return AutomatonArtists(points=points, switches=switches)
+    return {"points": points, "switches": switches}
 
 
-def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+def _draw_graph(ax: Axes, automaton: Automaton) -> dict[str, Any]:
     centres, radius = _places(automaton)
     colors = _colors(automaton)
     classes = automaton.trim_classes
@@ -373,7 +356,8 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
         [picture + centre for picture, centre in zip(pictures, centres, strict=True)],
         colors=colors, linewidths=1.8, zorder=4.0,
     )  # fmt: skip
-    for part in (nodes, switches, motions):
+    artists: dict[str, Any] = {"nodes": nodes, "switches": switches, "motions": motions}
+    for part in artists.values():
         ax.add_collection(part)
     ax.add_collection(
         PolyCollection(
@@ -381,13 +365,11 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
             facecolors=colors, linewidths=0.0, zorder=4.1,
         )
     )  # fmt: skip
-    maneuvers = _draw_maneuver_arrows(ax, automaton, centres, radius)
-    names = _draw_names(ax, automaton, centres, radius)
+    artists["maneuvers"] = _draw_maneuver_arrows(ax, automaton, centres, radius)
+    artists["names"] = _draw_names(ax, automaton, centres, radius)
     _make_room(ax, automaton, radius)
     ax.set_axis_off()
-    return AutomatonArtists(
-        nodes=nodes, motions=motions, switches=switches, maneuvers=maneuvers, names=names
-    )
+    return artists
 
 
 def _places(automaton: Automaton) -> tuple[Array, float]:

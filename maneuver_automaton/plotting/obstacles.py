@@ -178,16 +178,6 @@ MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ObstacleArtists:
-    """Artists of `draw_obstacles`."""
-
-    static: PathCollection  # one path per static shape
-    maps: tuple[PathCollection, ...]  # blocked cells, one collection per map
-    moving: PathCollection  # one path per time and moving shape, time by time
-    tracks: LineCollection  # where the middle of each goes in between
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MovingShape:
     """The path around a moving shape, in its own frame."""
 
@@ -219,7 +209,7 @@ def draw_obstacles(
     *,
     time: ArrayLike | None = None,
     fleeting: bool = False,
-) -> ObstacleArtists:
+) -> dict[str, Any]:
     """Draw `obstacles` on `ax`, which keeps its limits.
 
     Static obstacles are dark grey, moving ones violet, at several times the darker the later, over
@@ -240,8 +230,9 @@ def draw_obstacles(
 
     Returns
     -------
-    ObstacleArtists
-        The artists, by what they show.
+    dict of str to Artist
+        The artists, by what they show: "obstacles", a path for each; "map 0" and so on; "traffic",
+        a path for each moving shape, time by time; and its "tracks" in between.
 
     Examples
     --------
@@ -249,7 +240,7 @@ def draw_obstacles(
     >>> from maneuver_automaton.collision import Box, Disc
     >>> there = Obstacle(Disc(0.3), motion=Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]]))
     >>> artists = draw_obstacles(Figure().add_subplot(), [Box([1.0, 2.0]), there], time=[0.0, 0.5])
-    >>> len(artists.static.get_paths()), len(artists.moving.get_paths())
+    >>> len(artists["obstacles"].get_paths()), len(artists["traffic"].get_paths())
     (1, 2)
     """
     known = as_obstacles(obstacles)
@@ -273,15 +264,16 @@ def draw_obstacles(
     # Moving shapes, each in its colour, and whether each is there.
     drawn = PathCollection(shown, linewidths=0.7, zorder=1.9)
     show_presence(drawn, colors, there)
-    artists = ObstacleArtists(
-        static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
-        maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        moving=drawn,
-        tracks=LineCollection(
+    maps = [_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)]
+    artists = {
+        "obstacles": _solid([shape_path(one.shape) for one in static_shapes(known)]),
+        **{f"map {k}": one for k, one in enumerate(maps)},
+        "traffic": drawn,
+        "tracks": LineCollection(
             tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
-    )
-    for part in (artists.static, *artists.maps, artists.moving, artists.tracks):
+    }
+    for part in artists.values():
         ax.add_collection(part, autolim=False)
     return artists
 

@@ -6,14 +6,16 @@ Distances are measured by shapely at samples, to be looked at: what is proven is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullFormatter
 from numpy.typing import NDArray
@@ -23,7 +25,6 @@ from maneuver_automaton._lazy import shapely
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Actor, Cast, rings_with_radius
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.controls import TIME_LABEL, draw_over_time, step_curves, within
 from maneuver_automaton.plotting.paths import JUMP
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
@@ -36,7 +37,7 @@ from maneuver_automaton.plotting.style import (
     tidy,
 )
 from maneuver_automaton.plotting.together import HATCH
-from maneuver_automaton.plotting.track import TrackPiece, solids_at
+from maneuver_automaton.plotting.track import Track, TrackPiece, solids_at, step_curves
 from maneuver_automaton.recording import Curve, Mover
 
 STEP_S, MOST_STEPS = 0.05, 20_000  # between samples; no more of them, however long it takes
@@ -421,3 +422,67 @@ def _limits(cast: Cast) -> tuple[float, float]:
 def _span(cast: Cast) -> float:
     """How long all takes [s]; not nothing."""
     return cast.end - cast.recording.begin or 1.0
+
+
+TIME_LABEL = "time [s]"
+CONSTANT, NEAR = 0.02, 0.2  # of the largest value: varies less, or more, then zero is in view
+CROWDED = 30  # pieces from which on lines where trims change would hide what they part
+CHARACTER, OVER = 0.066, 0.1  # [in] of a label, and how far it may stand over its axes
+
+
+def draw_over_time(
+    ax: Axes,
+    track: Track,
+    curves: Sequence[Array],
+    *,
+    label: str,
+    colors: Mapping[str, Color],
+) -> dict[str, LineCollection]:
+    """Draw one curve (n, 2) per piece of a `track` in the colour of its trim.
+
+    The artists by what they show: steps, jumps from trim to trim, and switching times.
+    """
+    shown = [colors[piece.name] for piece in track.pieces]
+    times = track.switching_times
+    crowded = len(track.pieces) > CROWDED
+    artists = {
+        "steps": LineCollection(
+            curves, colors=shown, linewidths=2.4, capstyle="butt", zorder=3.0
+        ),
+        "jumps": LineCollection(
+            [np.stack([a[-1], b[0]]) for a, b in pairwise(curves)],
+            colors=[GREY], linewidths=0.35 if crowded else 0.9, zorder=2.5,
+        ),
+        "switches": LineCollection(
+            [] if crowded else [[(t, 0.0), (t, 1.0)] for t in times],
+            colors=[(*GREY, 0.6)], linewidths=0.6,
+            transform=ax.get_xaxis_transform(), zorder=1.5,
+        ),
+    }  # fmt: skip
+    for what, part in artists.items():
+        ax.add_collection(part, autolim=what != "switches")
+    _set_limits(ax, times, curves)
+    tidy(ax, x=TIME_LABEL, y=within(ax, label))
+    ax.grid(visible=False, axis="x")
+    return artists
+
+
+def within(ax: Axes, label: str) -> str:
+    """The label, in lines where it is longer than the axes are high."""
+    high = ax.bbox.height / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
+    most = max(12, int((high + OVER) / CHARACTER))
+    return label if len(label) <= most else "\n".join(textwrap.wrap(label, most))
+
+
+def _set_limits(ax: Axes, times: Array, curves: Sequence[Array]) -> None:
+    """Whole duration in x; in y the values seen so far, with zero and a little room."""
+    begin, end = (times[0], times[-1]) if times.size else (0.0, 1.0)
+    low, high = ax.dataLim.intervaly if np.isfinite(ax.dataLim.intervaly).all() else (0.0, 0.0)
+    values = np.concatenate([[low, high], *(curve[:, 1] for curve in curves)])
+    low, high = float(values.min()), float(values.max())
+    size = max(abs(low), abs(high))
+    if not CONSTANT * size < high - low <= NEAR * size:
+        low, high = min(low, 0.0), max(high, 0.0)
+    room = 0.12 * (high - low) or 1.0
+    ax.set_xlim(begin - 0.01 * (end - begin), end + 0.01 * (end - begin))
+    ax.set_ylim(low - room, high + room)

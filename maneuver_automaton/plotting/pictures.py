@@ -115,13 +115,8 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     )  # fmt: skip
     for part in (lanes, goals):
         ax.add_collection(part, autolim=False)
-    around = draw_obstacles(ax, world.obstacles, time=times, fleeting=world.fleeting)
-    parts = draw_limits(ax, world.zones, world.bounds)
-    parts |= {
-        "lanes": lanes, "obstacles": around.static, "traffic": around.moving,
-        "tracks": around.tracks,
-    }  # fmt: skip
-    parts |= {f"map {k}": one for k, one in enumerate(around.maps)}
+    parts = draw_obstacles(ax, world.obstacles, time=times, fleeting=world.fleeting)
+    parts |= draw_limits(ax, world.zones, world.bounds) | {"lanes": lanes}
     return parts | {f"ground {k}": one for k, one in enumerate(draw_ground(ax, world.ground))}
 
 

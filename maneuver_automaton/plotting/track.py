@@ -349,3 +349,14 @@ def _samples(piece: TrackPiece) -> Array:
     detour = float(np.linalg.norm(steps, axis=1).sum()) - length
     straight = np.ptp(pose[:, 2]) <= STRAIGHT_RAD and detour <= DETOUR * (1.0 + length)
     return pose[[0, -1]] if straight else pose
+
+
+def step_curves(track: Track, k: int) -> list[Array]:
+    """Control `k` over time, held from sample to sample: corners (n, 2) of its steps by piece."""
+    curves = []
+    for piece in track.pieces:
+        changes = np.flatnonzero(np.diff(piece.control[:-1, k])) + 1
+        starts = np.concatenate([[0], changes])
+        times = np.stack([piece.time[starts], piece.time[np.append(changes, -1)]], axis=-1)
+        curves.append(np.stack([times.ravel(), np.repeat(piece.control[starts, k], 2)], axis=-1))
+    return curves

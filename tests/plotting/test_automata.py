@@ -49,25 +49,25 @@ def with_inertia():
 
 def test_trims_are_nodes_and_free_switches_are_lines():
     artists = draw_automaton(Figure().add_subplot(), ROBOT)
-    assert [text.get_text() for text in artists.names] == list(ROBOT.trim_names)
-    assert len(artists.nodes.get_paths()) == 5
-    assert len(artists.switches.get_segments()) == 10
-    assert artists.maneuvers == ()
+    assert [text.get_text() for text in artists["names"]] == list(ROBOT.trim_names)
+    assert len(artists["nodes"].get_paths()) == 5
+    assert len(artists["switches"].get_segments()) == 10
+    assert artists["maneuvers"] == ()
     colors = trim_colors({trim.name: trim.body_velocity for trim in ROBOT.trims})
-    assert [to_rgb(color) for color in artists.motions.get_colors()] == list(colors.values())
+    assert [to_rgb(color) for color in artists["motions"].get_colors()] == list(colors.values())
 
 
 def test_maneuvers_are_arrows_and_classes_do_not_switch():
     artists = draw_automaton(Figure().add_subplot(), with_inertia())
-    assert len(artists.maneuvers) == 4
-    assert len(artists.switches.get_segments()) == 0
+    assert len(artists["maneuvers"]) == 4
+    assert len(artists["switches"].get_segments()) == 0
 
 
 def test_many_trims_are_points_over_turn_rate_and_speed():
     ax = Figure().add_subplot()
     artists = draw_automaton(ax, GRID)
-    assert artists.nodes is None
-    np.testing.assert_array_equal(artists.points.get_offsets(), GRID.body_velocities[:, [2, 0]])
+    assert "nodes" not in artists
+    np.testing.assert_array_equal(artists["points"].get_offsets(), GRID.body_velocities[:, [2, 0]])
     assert ax.get_xlabel() == "turn rate [rad/s]"
 
 
@@ -87,7 +87,7 @@ def _origin():
 def test_switches_and_motions_have_arrow_heads():
     ax = Figure(figsize=(4.0, 4.0)).add_subplot()
     artists = draw_automaton(ax, ROBOT)
-    many = len(artists.switches.get_segments())
+    many = len(artists["switches"].get_segments())
     heads = [len(part.get_paths()) for part in ax.collections if isinstance(part, PolyCollection)]
     assert many == 10
     assert 2 * many in heads  # at both ends: they go either way
@@ -114,6 +114,6 @@ def test_hundreds_of_maneuvers_are_thin_pale_lines_that_join_both_ways():
         for a, b in permutations(range(20), 2)
     ]  # fmt: skip
     ax = Figure(figsize=(4.0, 4.0)).add_subplot()
-    arrows = draw_automaton(ax, Automaton(few.model, tuple(trims), tuple(maneuvers))).maneuvers
+    arrows = draw_automaton(ax, Automaton(few.model, tuple(trims), tuple(maneuvers)))["maneuvers"]
     assert len(arrows) == 20 * 19 // 2
     assert all(arrow.get_alpha() < 0.5 for arrow in arrows)

@@ -79,7 +79,7 @@ def test_thin_walls_of_a_fine_map_stay_visible():
 
 def test_what_moves_is_where_it_is_at_the_time():
     _, artists = drawn(Obstacle(Box([1.0, 0.5]), motion=AROUND), time=1.0)
-    (path,) = artists.moving.get_paths()
+    (path,) = artists["traffic"].get_paths()
     expected = Box([1.0, 0.5], [2.0, 0.0], np.pi / 4).corners
     np.testing.assert_allclose(np.sort(path.vertices[:4], 0), np.sort(expected, 0), atol=1e-12)
 
@@ -87,10 +87,10 @@ def test_what_moves_is_where_it_is_at_the_time():
 def test_several_times_go_from_pale_to_dark_over_the_track():
     moving = [Obstacle(Disc(0.2, [0.0, y]), motion=AROUND) for y in (0.0, 1.0)]
     _, artists = drawn(moving, time=[0.5, 1.0, 1.5])
-    assert len(artists.moving.get_paths()) == 6
-    light = artists.moving.get_facecolor()[:, :3].sum(axis=1)
+    assert len(artists["traffic"].get_paths()) == 6
+    light = artists["traffic"].get_facecolor()[:, :3].sum(axis=1)
     assert light[0] == light[1] > light[2] == light[3] > light[4] == light[5]
-    track = artists.tracks.get_segments()[1]
+    track = artists["tracks"].get_segments()[1]
     for row, time in ((0, 0.5), (-1, 1.5)):
         np.testing.assert_allclose(track[row], SE2(AROUND.at(time)).act([0.0, 1.0]), atol=1e-9)
 
@@ -98,9 +98,9 @@ def test_several_times_go_from_pale_to_dark_over_the_track():
 def test_what_is_not_there_at_a_time_is_faint_and_dashed():
     door = Obstacle(Box([1.0, 0.2]), present_s=(0.0, 1.2))
     _, artists = drawn([door, Obstacle(Disc(0.2), motion=AROUND)], time=[0.5, 1.5])
-    alphas = artists.moving.get_facecolor()[:, 3]
+    alphas = artists["traffic"].get_facecolor()[:, 3]
     assert alphas[2] < 0.2 < 0.5 < alphas[0] == alphas[1] == alphas[3]
-    dashed = [pattern is not None for _, pattern in artists.moving.get_linestyle()]
+    dashed = [pattern is not None for _, pattern in artists["traffic"].get_linestyle()]
     assert dashed == [False, False, True, False]
     names = [name for _, name in obstacle_entries([door], np.array([0.5, 1.5]))]
     assert names == ["moving, at 0.5 s", "at 1.5 s", "not there at that time"]
@@ -112,7 +112,7 @@ def test_the_track_on_an_arc_is_the_arc():
     poses = [[0.0, 0.0, np.pi * k] if k % 2 == 0 else [0.0, 2.0, np.pi * k] for k in range(21)]
     circling = Motion(time, poses, [[np.pi, 0.0, np.pi]] * turns)
     _, artists = drawn(Obstacle(Disc(0.2), motion=circling), time=[0.0, 20.0])
-    track = artists.tracks.get_segments()[0]
+    track = artists["tracks"].get_segments()[0]
     np.testing.assert_allclose(np.linalg.norm(track - [0.0, 1.0], axis=1), 1.0, atol=1e-9)
     assert np.linalg.norm(np.diff(track, axis=0), axis=1).max() < 0.06
 
@@ -120,7 +120,8 @@ def test_the_track_on_an_arc_is_the_arc():
 def test_what_stands_and_what_moves_have_different_colours():
     _, artists = drawn([Disc(1.0), Obstacle(Disc(0.2), motion=AROUND)])
     still, moving = (
-        np.array(to_rgb(part.get_facecolor()[0])) for part in (artists.static, artists.moving)
+        np.array(to_rgb(part.get_facecolor()[0]))
+        for part in (artists["obstacles"], artists["traffic"])
     )
     assert np.ptp(still) < 0.1
     assert np.ptp(moving) > 0.3

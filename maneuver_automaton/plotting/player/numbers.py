@@ -20,10 +20,15 @@ from maneuver_automaton.collision.outline import blocked_rectangles, outlines, r
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.plotting.controls import step_curves
 from maneuver_automaton.plotting.obstacles import bound_lines, map_paths
 from maneuver_automaton.plotting.over_time import labels_of, thinned
-from maneuver_automaton.plotting.track import Track, TrackPiece, footprint_polygons, solids_at
+from maneuver_automaton.plotting.track import (
+    Track,
+    TrackPiece,
+    footprint_polygons,
+    solids_at,
+    step_curves,
+)
 from maneuver_automaton.problem import Bounds, Goal
 from maneuver_automaton.recording import Mover
 
