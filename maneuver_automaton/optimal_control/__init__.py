@@ -4,24 +4,15 @@ from maneuver_automaton.optimal_control.ipopt import SolverSettings as SolverSet
 from maneuver_automaton.optimal_control.ipopt import SolveStatus as SolveStatus
 from maneuver_automaton.optimal_control.ipopt import load_casadi as load_casadi
 from maneuver_automaton.optimal_control.ipopt import why_no_casadi as why_no_casadi
-from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective as ManeuverObjective
-from maneuver_automaton.optimal_control.maneuvers import TransferSettings as TransferSettings
-from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
-from maneuver_automaton.optimal_control.maneuvers import transfer_program as transfer_program
-from maneuver_automaton.optimal_control.polishing import polish as polish
 from maneuver_automaton.optimal_control.problem import Guess as Guess
 from maneuver_automaton.optimal_control.problem import (
     OptimalControlProblem as OptimalControlProblem,
 )
 from maneuver_automaton.optimal_control.problem import TimeGrid as TimeGrid
 from maneuver_automaton.optimal_control.problem import moving_frame as moving_frame
-from maneuver_automaton.optimal_control.problem import straight_guess as straight_guess
-from maneuver_automaton.optimal_control.scene import BodyPart as BodyPart
-from maneuver_automaton.optimal_control.scene import PolishSettings as PolishSettings
 from maneuver_automaton.optimal_control.transcription import (
     OptimalControlSolution as OptimalControlSolution,
 )
-from maneuver_automaton.optimal_control.transcription import Transcription as Transcription
 from maneuver_automaton.optimal_control.transcription import solve as solve
 from maneuver_automaton.optimal_control.transcription import transcribe as transcribe
 from maneuver_automaton.optimal_control.uniform_effort import (

@@ -1,10 +1,8 @@
 """Motion primitives: trims, which last as long as one likes, and maneuvers, which do not."""
 
-from maneuver_automaton.primitives.closed_form import Ramp as Ramp
 from maneuver_automaton.primitives.closed_form import bang_bang as bang_bang
 from maneuver_automaton.primitives.closed_form import connect_bang_bang as connect_bang_bang
 from maneuver_automaton.primitives.closed_form import from_rest as from_rest
-from maneuver_automaton.primitives.closed_form import ramp_of as ramp_of
 from maneuver_automaton.primitives.connecting import maneuver_defect as maneuver_defect
 from maneuver_automaton.primitives.driving import drive as drive
 from maneuver_automaton.primitives.driving import drive_all as drive_all

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -250,63 +249,14 @@ def _check_trim(model: Model, trim: Trim) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ramp:
-    """The quickest motion over a length from rest to rest: times of its three parts."""
+def _swing(
+    model: Model, rest: Trim, length: float, component: str
+) -> tuple[float, float, float, float]:
+    """How a component goes up from a rest and back, over `length`: its peak, and times [s].
 
-    peak: float  # greatest speed, signed as the length [m/s, or rad/s]
-    speed_up: float  # [s]
-    cruise: float  # [s]
-    brake: float  # [s]
-
-    @property
-    def duration(self) -> float:
-        """Time it takes [s]."""
-        return self.speed_up + self.cruise + self.brake
-
-
-def ramp_of(
-    length: float, *, max_speed: float, acceleration: float, deceleration: float | None = None
-) -> Ramp:
-    """Quickest speeds over a signed length, from rest to rest: a triangle, or a trapezoid.
-
-    Source: the area under the speed; LaValle (2006), *Planning Algorithms*, Sec. 14.6.3.
-
-    Parameters
-    ----------
-    length : float
-        Distance or angle, negative in reverse [m, or rad].
-    max_speed, acceleration : float
-        Greatest speed and rate of the speed, positive [m/s, m/s^2; or rad].
-    deceleration : float, optional
-        Greatest rate of braking; the acceleration if None.
-
-    Examples
-    --------
-    >>> ramp_of(4.0, max_speed=10.0, acceleration=1.0)
-    Ramp(peak=2.0, speed_up=2.0, cruise=0.0, brake=2.0)
-    >>> ramp_of(-4.0, max_speed=1.0, acceleration=1.0)
-    Ramp(peak=-1.0, speed_up=1.0, cruise=3.0, brake=1.0)
+    These are up, held and down: a triangle of speeds, or a trapezoid. Source: the area under the
+    speed; LaValle (2006), *Planning Algorithms*, Sec. 14.6.3.
     """
-    brake = acceleration if deceleration is None else deceleration
-    check_range("ramp: max_speed", max_speed)
-    check_range("ramp: acceleration", acceleration)
-    check_range("ramp: deceleration", brake)
-    if not math.isfinite(length):
-        raise ValueError(f"ramp: length must be finite, got {length}")
-    ramps = 0.5 / acceleration + 0.5 / brake  # length of both ramps over the squared peak
-    peak = min(max_speed, math.sqrt(abs(length) / ramps))
-    cruise = (abs(length) - ramps * peak * peak) / peak if peak == max_speed else 0.0
-    return Ramp(
-        peak=math.copysign(peak, length),
-        speed_up=peak / acceleration,
-        cruise=max(0.0, cruise),
-        brake=peak / brake,
-    )
-
-
-def _swing(model: Model, rest: Trim, length: float, component: str) -> Ramp:
-    """How a component of the reduced state goes up from a rest and back, over `length` in all."""
     check_limited_rates(model)
     if not rest.is_rest:
         raise NotATrim(f"trim {rest.name!r}: moves with {rest.body_velocity.tolist()}, need a rest")
@@ -325,9 +275,13 @@ def _swing(model: Model, rest: Trim, length: float, component: str) -> Ramp:
     moving = rest.reduced_state.copy()
     moving[k] = most
     pace = min(1.0, pace_within(model, model.body_velocity(moving, rest.control)))
-    return ramp_of(
-        length, max_speed=float(most) * pace, acceleration=float(up), deceleration=float(down)
-    )
+    top, up, down = float(most) * pace, float(up), float(down)
+    check_range(f"stroke: the greatest {component}", top)
+    check_range(f"stroke: the rate of the {component}", min(up, down))
+    ramps = 0.5 / up + 0.5 / down  # length of both ramps over the squared peak
+    peak = min(top, math.sqrt(abs(length) / ramps))
+    held = (abs(length) - ramps * peak * peak) / peak if peak == top else 0.0
+    return math.copysign(peak, length), peak / up, max(0.0, held), peak / down
 
 
 def from_rest(
@@ -360,12 +314,11 @@ def from_rest(
     asked = [(rest, length) for rest in rests for length in lengths]
     if not asked:
         return ()
-    ramps = [_swing(model, rest, length, component) for rest, length in asked]
-    durations = np.array([[ramp.speed_up, ramp.cruise, ramp.brake] for ramp in ramps])
+    swings = [_swing(model, rest, length, component) for rest, length in asked]
+    durations = np.array([times for _, *times in swings])
     control, driven = np.zeros((len(asked), 3, len(model.control_names))), model.reduced_names
-    for row, ramp in zip(control, ramps, strict=True):
-        rates = [ramp.peak / ramp.speed_up, 0.0, -ramp.peak / ramp.brake]
-        row[:, driven.index(component)] = rates
+    for row, (peak, up, _, down) in zip(control, swings, strict=True):
+        row[:, driven.index(component)] = [peak / up, 0.0, -peak / down]
     courses = drive_all(
         model, [rest.reduced_state for rest, _ in asked], control=control, durations=durations
     )

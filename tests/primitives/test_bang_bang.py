@@ -24,7 +24,6 @@ from maneuver_automaton.primitives import (
     bang_bang,
     connect_bang_bang,
     from_rest,
-    ramp_of,
     trims_of,
 )
 from maneuver_automaton.primitives.closed_form import differing, has_limited_rates
@@ -219,11 +218,18 @@ def test_turns_on_the_spot(angle, left):
     assert np.abs(whole.course.reduced_state[:, 1]).max() <= ROBOT.max_turn_rate + 1e-12
 
 
+class HardBraking(SecondOrderUnicycle):
+    control_limits = np.array([[-2.0, 1.0], [-1.0, 1.0]])
+
+
 def test_braking_may_be_harder_than_speeding_up():
-    ramp = ramp_of(3.0, max_speed=10.0, acceleration=1.0, deceleration=2.0)
-    assert (ramp.peak, ramp.speed_up, ramp.brake) == (2.0, 2.0, 1.0)
-    assert ramp.duration == 3.0
-    assert ramp_of(0.0, max_speed=1.0, acceleration=1.0).duration == 0.0
+    robot = HardBraking(
+        max_speed=10.0, max_turn_rate=1.0, max_acceleration=2.0, max_angular_acceleration=1.0
+    )
+    (whole,) = from_rest(robot, [trim_at(robot, 0.0, 0.0)], [3.0], "speed")
+    assert whole.duration == 3.0
+    np.testing.assert_allclose(whole.course.reduced_state[:, 0].max(), 2.0)
+    np.testing.assert_allclose(whole.displacement, [3.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_wheels_turn_at_rest():
@@ -249,5 +255,3 @@ def test_reverse_must_be_allowed():
         from_rest(CAR, [trim_at(CAR, 0.0, 0.0)], [1.0], "turn_rate")
     with pytest.raises(NotATrim, match=r"trim 'speed 1, steering 0': moves with .*, need a rest"):
         from_rest(CAR, [trim_at(CAR, 1.0, 0.0)], [1.0], "speed")
-    with pytest.raises(ValueError, match="ramp: max_speed must be positive, got -1"):
-        ramp_of(1.0, max_speed=-1.0, acceleration=1.0)
