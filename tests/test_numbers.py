@@ -240,6 +240,7 @@ def of_a_fleet_driven(**options):
 FREE = ma.Problem(robot(Plain()), [0, 0, 0], [3, 1, 0])
 PLANNER = ma.Planner(FREE.automaton)
 PLAN = ma.Plan([0, 0, 0], FREE.automaton.trims[1:3], durations=[1, 1])
+GROWTH = analysis.GrowthBound(times=[1, 4], bounds=[1, 1], worst=np.ones((2, 3)), samples=1)
 ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "time_limit": (lambda v: ma.plan(FREE, time_limit=v).cost, 60),
     "alternatives": (lambda v: len(ma.plan(FREE, alternatives=v).alternatives), 1),
@@ -273,7 +274,7 @@ ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "delay_steps": (lambda v: of_a_fleet_driven(delay_steps=v), 0),
     "seed of its loop": (lambda v: of_a_fleet_driven(seed=v), 1),
     "first_time_limit": (lambda v: of_a_fleet_driven(first_time_limit=v), 60),
-    "horizon": (lambda v: analysis.continuous_index([1, 4], [1, 1], horizon=v, step=2), 4),
+    "step of a horizon": (lambda v: analysis.certified_horizon(GROWTH, step=v).horizon, 1),
 }
 
 

@@ -22,7 +22,6 @@ from maneuver_automaton.analysis.library_conditions import LibraryReport as Libr
 from maneuver_automaton.analysis.library_conditions import check_library as check_library
 from maneuver_automaton.analysis.stability import CertifiedHorizon as CertifiedHorizon
 from maneuver_automaton.analysis.stability import certified_horizon as certified_horizon
-from maneuver_automaton.analysis.stability import continuous_index as continuous_index
 from maneuver_automaton.analysis.symmetry import ControlProblem as ControlProblem
 from maneuver_automaton.analysis.symmetry import (
     check_boundary_condition as check_boundary_condition,

@@ -52,6 +52,11 @@ class GrowthBound:
         for name in ("times", "bounds"):
             freeze(self, name)
         freeze(self, "worst", last=3)
+        t, b = self.times, self.bounds
+        if t.ndim != 1 or t.shape != b.shape or (np.diff(t) <= 0.0).any() or not t[0] > 0.0:
+            raise ValueError("times: need one axis of rising positive times, with one growth each")
+        if not (b > 0.0).all() or (np.diff(b) < 0.0).any():
+            raise ValueError(f"growth: got {b.tolist()}, need positive numbers that rise")
 
     def __repr__(self) -> str:
         last = f"B({self.times[-1]:.6g} s) = {self.bounds[-1]:.6g} s"

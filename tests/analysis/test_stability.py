@@ -12,7 +12,6 @@ from maneuver_automaton.analysis.growth import (
 )
 from maneuver_automaton.analysis.stability import (
     certified_horizon,
-    continuous_index,
 )
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
@@ -29,15 +28,25 @@ from tests.receding_horizon.unconstrained_cases import (
 TIMES = np.arange(1, 17) / 2.0
 
 
+def bound(times, bounds):
+    worst = np.ones((len(times), 3))
+    return GrowthBound(times=times, bounds=bounds, worst=worst, samples=1)
+
+
 def test_resting_alone_gives_an_index_of_zero_in_continuous_time():
     times = np.arange(1, 40001) / 1e4
-    assert continuous_index(times, times, horizon=4.0, step=0.5) == pytest.approx(0.0, abs=1e-3)
+    assert certified_horizon(bound(times, times), step=0.5).indices[-1] == pytest.approx(
+        0.0, abs=1e-3
+    )
 
 
 def test_the_index_by_hand():
     root = math.exp(-1.0)
     expected = 1.0 - root * root / (1.0 - root) ** 2
-    assert continuous_index([2.0], [1.0], horizon=2.0, step=1.0) == pytest.approx(expected)
+    index = certified_horizon(bound([2.0], [1.0]), step=1.0).indices[-1]
+    assert index == pytest.approx(expected)
+    index = certified_horizon(bound([1.0, 4.0], [1.0, 1.0]), step=2.0).indices[-1]
+    assert index == pytest.approx(1.0 - 1.0 / (math.exp(2.0) - 1.0) ** 2)
 
 
 def test_the_ring_has_its_level():
@@ -105,17 +114,12 @@ ROWS = np.ones((2, 3))
     ("make", "message"),
     [
         (
-            lambda: continuous_index([2.0, 1.0], [1.0, 1.0], horizon=2.0, step=1.0),
+            lambda: bound([2.0, 1.0], [1.0, 1.0]),
             "times: need one axis of rising positive times, with one growth each",
         ),
         (
-            lambda: continuous_index([1.0, 2.0], [1.0, 0.5], horizon=2.0, step=1.0),
+            lambda: bound([1.0, 2.0], [1.0, 0.5]),
             "growth: got [1.0, 0.5], need positive numbers that rise",
-        ),
-        (
-            lambda: continuous_index([1.0, 2.0], [1.0, 1.0], horizon=3.0, step=1.0),
-            "horizon: got step 1.0 s and horizon 3.0 s, need 0 < step < horizon and a horizon of "
-            "at most 2 s",
         ),
         (
             lambda: ring_poses(MIXED, levels=[0.0]),
