@@ -56,26 +56,6 @@ class ArocPrimitive:
         freeze(self, "inputs", last=len(INPUTS))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArocDeviation:
-    """How far the automaton is from the files, at most."""
-
-    position: float  # [m] of a driven motion from the stated states
-    heading: float  # [rad]
-    speed: float  # [m/s]
-    worst: str  # file of the primitive that is furthest off
-    added: int  # pairs that may follow each other in the automaton, and not in AROC
-
-    def __str__(self) -> str:
-        """One line for people."""
-        plural = "" if self.added == 1 else "s"
-        return (
-            f"driven with the inputs of the files, motions are at most {self.position:.2g} m, "
-            f"{self.heading:.2g} rad and {self.speed:.2g} m/s off their states ({self.worst}); "
-            f"{self.added} pair{plural} may follow each other that AROC does not let follow"
-        )
-
-
 def export_at(path: Path) -> Path | zipfile.Path | None:
     """The folder of an export: that of its list, one in an archive or folder, itself, or None."""
     base: Path | zipfile.Path = path.parent if path.name == LIST else path
@@ -168,8 +148,8 @@ def automaton_of_aroc(
     return Automaton(model, tuple(trims.values()), tuple(maneuvers), name=name)
 
 
-def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) -> ArocDeviation:
-    """How far the maneuvers of `automaton_of_aroc` are from the files."""
+def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) -> tuple[float, str]:
+    """How far the maneuvers of `automaton_of_aroc` are from the files at most [m]; in words too."""
     off = []
     for one, maneuver in zip(primitives, automaton.maneuvers, strict=True):
         assert maneuver.course is not None  # it was made with one
@@ -180,14 +160,15 @@ def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) ->
         speed = np.abs(maneuver.course.reduced_state[nearest, 0] - one.states[:, 3])
         off.append((float(np.hypot(gap[:, 0], gap[:, 1]).max()), gap[:, 2].max(), speed.max()))
     table = np.array(off)
+    position, heading, speed = table.max(axis=0).tolist()
+    worst = primitives[int(table.max(axis=1).argmax())].name
     sources = [maneuver.source for maneuver in automaton.maneuvers]
     allowed = sum(sources.count(maneuver.target) for maneuver in automaton.maneuvers)
-    return ArocDeviation(
-        position=float(table[:, 0].max()),
-        heading=float(table[:, 1].max()),
-        speed=float(table[:, 2].max()),
-        worst=primitives[int(table.max(axis=1).argmax())].name,
-        added=allowed - sum(len(set(one.successors)) for one in primitives),
+    added = allowed - sum(len(set(one.successors)) for one in primitives)
+    return position, (
+        f"driven with the inputs of the files, motions are at most {position:.2g} m, "
+        f"{heading:.2g} rad and {speed:.2g} m/s off their states ({worst}); {added} "
+        f"pair{'' if added == 1 else 's'} may follow each other that AROC does not let follow"
     )
 
 

@@ -90,28 +90,6 @@ class RoadPrimitives:
         return tuple(one.seconds / most[round(one.seconds, DIGITS)] for one in self.primitives)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Deviation:
-    """How far the driven motions are from the states of a file, at most."""
-
-    position: float  # [m]
-    heading: float  # [rad]
-    speed: float  # [m/s] to that of the trims
-    steering: float  # [rad]
-    worst: int  # which primitive is furthest off
-    beyond: int  # primitives that are more than `LARGE` off
-
-    def __str__(self) -> str:
-        """One line for people."""
-        many = "primitive is" if self.beyond == 1 else "primitives are"
-        return (
-            f"driven with controls that are constant in each step, {self.beyond} {many} "
-            f"more than {LARGE:g} m or rad off their states; at most {self.position:.2g} m and "
-            f"{self.heading:.2g} rad (primitive {self.worst + 1}); their ends were moved by "
-            f"{self.speed:.2g} m/s and {self.steering:.2g} rad to meet"
-        )
-
-
 def is_commonroad_primitives(path: Path) -> bool:
     """Whether the root of an XML file is that of primitives."""
     return root_tag(path) in (ROOT, OLDER_ROOT)
@@ -209,8 +187,8 @@ def automaton_of_commonroad_primitives(
     return Automaton(model, trims, tuple(maneuvers), name=name)
 
 
-def deviation_of(file: RoadPrimitives, automaton: Automaton) -> Deviation:
-    """How far the maneuvers of `automaton_of_commonroad_primitives` are from the file's states."""
+def deviation_of(file: RoadPrimitives, automaton: Automaton) -> tuple[float, str]:
+    """How far the maneuvers made of a file are from its states at most [m]; in words too."""
     off, moved = [], np.zeros(2)
     for one, step, maneuver in zip(file.primitives, file.steps(), automaton.maneuvers, strict=True):
         assert maneuver.course is not None  # it was made with one
@@ -220,14 +198,15 @@ def deviation_of(file: RoadPrimitives, automaton: Automaton) -> Deviation:
         off.append((float(np.hypot(gaps[:, 0], gaps[:, 1]).max()), float(gaps[:, 2].max())))
         ends = (automaton[maneuver.source].reduced_state, automaton[maneuver.target].reduced_state)
         moved = np.maximum(moved, np.abs(np.array(ends) - one.states[[0, -1], 3:]).max(axis=0))
-    most = np.array(off).max(axis=1)
-    return Deviation(
-        position=max(pair[0] for pair in off),
-        heading=max(pair[1] for pair in off),
-        speed=float(moved[0]),
-        steering=float(moved[1]),
-        worst=int(most.argmax()),
-        beyond=int(np.count_nonzero(most > LARGE)),
+    position, heading = np.max(off, axis=0).tolist()
+    most, (speed, steering) = np.max(off, axis=1), moved.tolist()
+    beyond = int(np.count_nonzero(most > LARGE))
+    return position, (
+        f"driven with controls that are constant in each step, {beyond} "
+        f"{'primitive is' if beyond == 1 else 'primitives are'} more than {LARGE:g} m or rad off "
+        f"their states; at most {position:.2g} m and {heading:.2g} rad (primitive "
+        f"{int(most.argmax()) + 1}); their ends were moved by {speed:.2g} m/s and "
+        f"{steering:.2g} rad to meet"
     )
 
 

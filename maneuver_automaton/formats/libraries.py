@@ -55,7 +55,7 @@ def _read(path: Path, model: Model | None) -> PrimitivesRead | None:
         folder = path.parent if path.name == aroc.LIST else path
         own = model if isinstance(model, AcceleratingCar) else None
         automaton = aroc.automaton_of_aroc(file, model=own, name=folder.resolve().stem)
-        remark = str(aroc.deviation_of(file, automaton))
+        _, remark = aroc.deviation_of(file, automaton)
     elif path.is_dir() or not path.exists():
         return None
     elif ending == MPRIM:
@@ -69,7 +69,7 @@ def _read(path: Path, model: Model | None) -> PrimitivesRead | None:
     elif ending == XML and commonroad_primitives.is_commonroad_primitives(path):
         kind, file = "CommonRoad", commonroad_primitives.read_commonroad_primitives(path)
         automaton = commonroad_primitives.automaton_of_commonroad_primitives(file, name=path.stem)
-        remark = str(commonroad_primitives.deviation_of(file, automaton))
+        _, remark = commonroad_primitives.deviation_of(file, automaton)
     elif ending == JSON and _is_nav2(path):
         kind, file = "Nav2", nav2_lattice.read_nav2_lattice(path)
         automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=path.name.split(".json")[0])
