@@ -5,24 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import as_array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LibraryReport:
-    """Whether turn-move-turn is possible: which trims serve, and what is missing."""
+    """Whether turn-move-turn is possible, and what is missing for it."""
 
-    holds: bool
-    rests: tuple[int, ...]  # indices of trims that stand still
-    straights: tuple[int, ...]  # that drive straight ahead
-    spins: tuple[int, ...]  # that turn on the spot
     missing: tuple[str, ...]
-    message: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing is missing."""
+        return not self.missing
 
     def __str__(self) -> str:
-        return self.message
+        word = "every pose by turn, move, turn"
+        if self.holds:
+            return f"library reaches {word}"
+        return f"library does not reach {word}: {'; '.join(self.missing)}"
 
 
 def check_library(
@@ -59,41 +62,17 @@ def check_library(
     >>> check_library(twists[:2]).missing
     ('no spin, with body velocity (0, 0, w != 0)',)
     """
-    v_x, v_y, turn = _columns(body_velocities)
-    still, level = np.hypot(v_x, v_y) <= tolerance, np.abs(turn) <= tolerance
-    rests = _indices(still & level)
-    straights = _indices((v_x > tolerance) & (np.abs(v_y) <= tolerance) & level)
-    spins = _indices(still & ~level)
-    missing = []
-    if max_trims is not None and max_trims < 3:
-        missing.append(f"words of at most {max_trims} trims, need 3")
-    if not rests:
-        missing.append("no rest, with body velocity (0, 0, 0), to wait for a fixed final time")
-    if not straights:
-        missing.append("no forward straight, with body velocity (v > 0, 0, 0)")
-    if not spins:
-        missing.append("no spin, with body velocity (0, 0, w != 0)")
-    message = (
-        f"library does not reach every pose by turn, move, turn: {'; '.join(missing)}"
-        if missing
-        else "library reaches every pose by turn, move, turn"
-    )
-    return LibraryReport(
-        holds=not missing,
-        rests=rests,
-        straights=straights,
-        spins=spins,
-        missing=tuple(missing),
-        message=message,
-    )
-
-
-def _columns(body_velocities: ArrayLike) -> tuple[Array, Array, Array]:
     twists = as_array("body_velocities", body_velocities, last=3)
     if twists.ndim != 2:
         raise ValueError(f"body_velocities: got shape {twists.shape}, need (m, 3)")
-    return twists[:, 0], twists[:, 1], twists[:, 2]
-
-
-def _indices(chosen: NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(i) for i in np.flatnonzero(chosen))
+    v_x, v_y, turn = twists.T
+    still, level = np.hypot(v_x, v_y) <= tolerance, np.abs(turn) <= tolerance
+    asked = {
+        f"words of at most {max_trims} trims, need 3": max_trims is None or max_trims >= 3,
+        "no rest, with body velocity (0, 0, 0), to wait for a fixed final time": still & level,
+        "no forward straight, with body velocity (v > 0, 0, 0)": (
+            (v_x > tolerance) & (np.abs(v_y) <= tolerance) & level
+        ),
+        "no spin, with body velocity (0, 0, w != 0)": still & ~level,
+    }
+    return LibraryReport(missing=tuple(what for what, there in asked.items() if not np.any(there)))

@@ -76,7 +76,7 @@ def of_vehicle(problem: Problem) -> Iterator[Finding]:
     missing = f"sufficient, not necessary, to reach every pose: {'; '.join(report.missing)}"
     yield Finding(
         "library: turn, move, turn",
-        report.message if report.holds else missing,
+        str(report) if report.holds else missing,
         holds=True if report.holds else None,
     )
 
