@@ -63,9 +63,7 @@ class GrowthBound:
         return f"GrowthBound({last}, sampled at {self.samples} poses)"
 
 
-def ring_poses(
-    cost: _PoseCost, *, levels: ArrayLike, parts: int = 4, max_heading: float = np.pi
-) -> Array:
+def ring_poses(cost: _PoseCost, *, levels: ArrayLike, parts: int = 4) -> Array:
     """Poses (n, 3) seen from the goal that cost `levels` per second, shared among x, y, heading.
 
     With exponents (4, 2, 4) the poses of one level are those of another, x and heading multiplied
@@ -80,8 +78,6 @@ def ring_poses(
         Positive costs per second.
     parts : int
         Each share is a multiple of 1 / parts; all signs are taken.
-    max_heading : float
-        Greatest heading [rad]; what would be beyond is put there, and costs less.
 
     Examples
     --------
@@ -97,7 +93,7 @@ def ring_poses(
     shares = [s for s in itertools.product(range(parts + 1), repeat=3) if sum(s) == parts]
     sizes = np.multiply.outer(rates, np.array(shares) / parts) / cost.pose_weights
     magnitudes = (sizes ** (1.0 / cost.pose_orders)).reshape(-1, 3)
-    magnitudes[:, 2] = np.minimum(magnitudes[:, 2], max_heading)
+    magnitudes[:, 2] = np.minimum(magnitudes[:, 2], np.pi)  # what is beyond costs less
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     every: Array = (magnitudes[:, None] * signs).reshape(-1, 3) + 0.0  # no negative zero
     _, first = np.unique(every, axis=0, return_index=True)
