@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.optimize import linprog
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.groups import SE2
@@ -41,6 +42,32 @@ def best_of_all(value, trims, intervals):
     values = [value(word) for word in words]
     best = int(np.argmin(values))
     return words[best], values[best]
+
+
+def index_by_program(growth, applied):
+    """Suboptimality index as the linear program it comes from.
+
+    Least decrease of the value per cost driven, over all stage costs of an optimal plan and all
+    values after it that the growth admits.
+    Source: Grüne, Pannek, Seehafer, Worthmann (2010), Problem 3.8 in its linear form (4.7).
+    """
+    n = len(growth)
+    rows = []
+    for k in range(n):  # the tail of an optimal plan is optimal
+        row = np.zeros(n + 1)
+        row[k:n] = 1.0
+        row[k] -= growth[n - k - 1]
+        rows.append(row)
+    for j in range(n - applied):  # follow the plan for j steps more, then start afresh
+        row = np.zeros(n + 1)
+        row[n] = 1.0
+        row[applied : applied + j] -= 1.0
+        row[applied + j] -= growth[n - j - 1]
+        rows.append(row)
+    gain = np.append(np.ones(n), -1.0)
+    driven = np.append(np.ones(applied), np.zeros(n + 1 - applied))
+    solution = linprog(gain, rows, np.zeros(len(rows)), [driven], [1.0], bounds=(0.0, None))
+    return solution.fun
 
 
 class Exhausted(NamedTuple):

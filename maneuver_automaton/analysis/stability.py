@@ -1,4 +1,4 @@
-"""Which fixed horizon makes the closed loop stable.
+"""Which fixed horizon makes the closed loop stable, and whether a closed loop did as foretold.
 
 The index of suboptimality says how much of the stage cost a horizon without terminal cost recovers.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_number, freeze
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze
 from maneuver_automaton.analysis.growth import GrowthBound
 
 POSITIVE = 1e-9  # an index up to this is rounding: where resting is best it is exactly zero
@@ -91,4 +92,55 @@ def certified_horizon(growth: GrowthBound, *, step: float) -> CertifiedHorizon:
         horizons=horizons,
         indices=indices,
         growth=growth,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClosedLoopCheck:
+    """Whether a closed loop kept the promise of an index."""
+
+    index: float
+    steps: int
+    least_decrease: float  # of the value per cost driven, in any step
+    cost: float  # driven in all
+    limit: float  # the promise: first value / index; inf if that is not positive
+
+    @property
+    def holds(self) -> bool:
+        """Whether every step decreased enough, and with that the cost is below its limit."""
+        return self.least_decrease >= self.index and self.cost <= self.limit * (1.0 + 1e-12)
+
+
+def check_closed_loop(
+    values: ArrayLike, stage_costs: ArrayLike, *, index: float
+) -> ClosedLoopCheck:
+    """Compare values (k + 1,) and costs driven (k,) of a closed loop with what `index` promises.
+
+    The promise is a decrease of ``index`` x the cost driven in every step, and so a total cost of
+    at most the first value / index. Give only the steps made where the growth bound holds.
+
+    Raises
+    ------
+    ValueError
+        If there is no step, the numbers do not fit together, or a cost is not positive.
+
+    Examples
+    --------
+    >>> check = check_closed_loop([3.0, 2.0, 1.2], [1.0, 1.0], index=0.5)
+    >>> check.holds, round(check.least_decrease, 3), check.limit
+    (True, 0.8, 6.0)
+    """
+    v, driven = as_array("values", values), as_array("stage_costs", stage_costs)
+    if driven.ndim != 1 or not driven.size or v.shape != (driven.size + 1,):
+        raise ValueError(
+            f"values: got shape {v.shape} for costs of shape {driven.shape}, need one more"
+        )
+    if not (driven > 0.0).all():
+        raise ValueError(f"stage_costs: got {driven.min()}, need positive costs")
+    return ClosedLoopCheck(
+        index=index,
+        steps=driven.size,
+        least_decrease=float(np.min((v[:-1] - v[1:]) / driven)),
+        cost=float(driven.sum()),
+        limit=float(v[0] / index) if index > 0.0 else np.inf,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.analysis.examine import (
     NOWHERE,
     Draw,
@@ -18,6 +18,7 @@ from maneuver_automaton.analysis.examine import (
     examine,
     unit_of,
 )
+from maneuver_automaton.analysis.shift import StateControlFunction
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import (
     Model,
@@ -27,9 +28,6 @@ from maneuver_automaton.models import (
     rollout,
     vector_field,
 )
-
-StateControlFunction = Callable[[Array, Array], ArrayLike]
-"""A function of one state (n_x,), pose first, and one control (n_u,): one or more numbers."""
 
 
 def check_vector_field(
@@ -352,67 +350,81 @@ def _check(
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ControlProblem:
-    """Drive from `start` to `goal` under constraints ``g(x, u) <= 0``, at least cost."""
+class Equivalence:
+    """How two motions are related: ``a == group_element b``, up to `worst_deviation`."""
 
-    start: Array  # (n_x,) pose, then reduced state
-    goal: Array  # (n_x,)
-    stage_cost: StateControlFunction | None = None  # None: feasibility is all that counts
-    constraints: tuple[StateControlFunction, ...] = ()
-
-    def __post_init__(self) -> None:
-        freeze(self, "start")
-        freeze(self, "goal", last=self.start.size)
+    equivalent: bool
+    group_element: LieGroup  # moves the first pose of b onto the first pose of a
+    worst_deviation: float  # greatest difference of a coordinate [m, rad, the model's units]
+    worst_time: float  # when it occurs [s]
+    component: str  # coordinate in which it occurs; reduced states are z1, z2, ...
 
 
-def shifted_problem(problem: ControlProblem, by: LieGroup) -> ControlProblem:
-    """Problem moved by a group element: solved by the same controls, at the same cost.
+def same_motion_primitive(
+    trajectory_a: ArrayLike,
+    trajectory_b: ArrayLike,
+    *,
+    times: ArrayLike,
+    group: type[LieGroup],
+    tolerance: float = 1e-9,
+) -> Equivalence:
+    """Whether one group element moves all of motion b onto motion a.
 
-    A fixed start, a fixed goal, walls and costs with references are not invariant; here all of them
-    are moved by the same element.
+    The element is that which joins the first poses. Headings are compared as they are, so a motion
+    with a full turn more is another motion; reduced states have to agree unmoved.
 
-    Source: the paper, Sec. 3.2 and Example 10.
+    Source: the paper, Def. 4.
+
+    Parameters
+    ----------
+    trajectory_a, trajectory_b : (n, n_x) arrays
+        States at the same instants: pose, then reduced state.
+    times : (n,) array
+        These instants [s], counted from the start of each motion.
+    group : type[LieGroup]
+        Group that moves the poses.
+    tolerance : float
+        Greatest difference of a coordinate admitted [m, rad, the model's units].
+
+    Returns
+    -------
+    Equivalence
+        The group element, and how well it fits.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit together.
 
     Examples
     --------
-    Driving straight ahead for T seconds solves the first problem, and the shifted one.
-
     >>> from maneuver_automaton.groups import SE2
-    >>> T = 4.0
-    >>> ahead = SE2.exp(T * np.array([1 / T, 0.0, 0.0]))
-    >>> problem = ControlProblem(start=[-1.0, 0.0, 0.0], goal=[0.0, 0.0, 0.0])
-    >>> bool(np.all((SE2(problem.start) @ ahead).pose == problem.goal))
-    True
-    >>> shifted = shifted_problem(problem, SE2([1.0, 1.0, 0.0]))
-    >>> shifted.start.tolist(), shifted.goal.tolist()
-    ([0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-    >>> bool(np.all((SE2(shifted.start) @ ahead).pose == shifted.goal))
-    True
-
-    With only the start shifted it does not: that is a parallel parking problem.
-
-    >>> bool(np.all((SE2(shifted.start) @ ahead).pose == problem.goal))
-    False
+    >>> times = np.linspace(0.0, 2.0, 5)
+    >>> coast = SE2.exp(times[:, None] * [1.0, 0.0, 0.5])
+    >>> a = (SE2([0.0, 1.0, 0.0]) @ coast).pose
+    >>> b = (SE2([4.0, 0.0, np.pi]) @ coast).pose
+    >>> same = same_motion_primitive(a, b, times=times, group=SE2)
+    >>> same.equivalent, same.group_element.pose.round(3).tolist()
+    (True, [4.0, 1.0, -3.142])
     """
-    return ControlProblem(
-        start=moved_state(by, problem.start),
-        goal=moved_state(by, problem.goal),
-        stage_cost=None if problem.stage_cost is None else shifted_function(problem.stage_cost, by),
-        constraints=tuple(shifted_function(g, by) for g in problem.constraints),
+    a, b = as_array("trajectory_a", trajectory_a), as_array("trajectory_b", trajectory_b)
+    times = as_array("times", times)
+    if a.ndim != 2 or a.shape[1] < group.dof or a.shape != b.shape or len(times) != len(a):
+        raise ValueError(
+            f"same_motion_primitive: got shapes {a.shape}, {b.shape} and {times.shape} for "
+            f"trajectory_a, trajectory_b and times, need (n, n_x) twice, with n_x at least "
+            f"{group.dof}, and (n,)"
+        )
+    if not len(times):
+        raise ValueError("same_motion_primitive: got no samples, need at least 1")
+    element = group(a[0, : group.dof]) @ group(b[0, : group.dof]).inverse()
+    deviation = np.abs(moved_state(element, b) - a)
+    row, column = np.unravel_index(int(np.argmax(deviation)), deviation.shape)
+    names = (*group.coordinates, *(f"z{i + 1}" for i in range(a.shape[1] - group.dof)))
+    return Equivalence(
+        equivalent=bool(deviation[row, column] <= tolerance),
+        group_element=element,
+        worst_deviation=float(deviation[row, column]),
+        worst_time=float(times[row]),
+        component=names[column],
     )
-
-
-def shifted_function(function: StateControlFunction, by: LieGroup) -> StateControlFunction:
-    """Stage cost or constraint moved by a group element: ``l'(Psi_g x, u) == l(x, u)``.
-
-    Source: the paper, Sec. 3.2.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import SE2
-    >>> wall = shifted_function(lambda x, u: x[0] - 3.0, SE2([10.0, 0.0, 0.0]))  # x <= 3 m
-    >>> float(wall(np.array([12.0, 0.0, 0.0]), np.zeros(2)))
-    -1.0
-    """
-    back = by.inverse()
-    return lambda state, control: function(moved_state(back, state), control)

@@ -94,6 +94,25 @@ def effort_report(
     )
 
 
+def effort_threshold(limits: ArrayLike, effort_matrix: ArrayLike | None = None) -> float:
+    """r*: the greatest r for which all controls with ``|u|_R^2 <= r`` are within the limits.
+
+    An optimal control has uniform effort or, wherever it has not, an effort of at least r*.
+
+    Source: the paper, Cor. 19; the ellipsoid ``|u|_R^2 <= r`` is ``sqrt(r (R^-1)_jj)`` wide.
+
+    Examples
+    --------
+    >>> effort_threshold([[-2.0, 2.0], [-1.0, 3.0]])
+    1.0
+    """
+    box = np.asarray(limits, dtype=np.float64)
+    matrix = _matrix(effort_matrix)
+    widths = np.ones(len(box)) if matrix is None else np.diag(np.linalg.inv(matrix))
+    nearest = np.maximum(np.minimum(-box[:, 0], box[:, 1]), 0.0)
+    return float(np.min(nearest * nearest / widths, initial=np.inf))
+
+
 def moving_trims(plan: Plan) -> np.ndarray[tuple[int, ...], np.dtype[np.bool]]:
     """Which trims (n,) change the pose; the others are rests, or last no time."""
     still = np.array([trim.is_rest for trim in plan.trims], dtype=np.bool)

@@ -10,13 +10,11 @@ from maneuver_automaton.analysis.growth import (
     growth_bound,
     ring_poses,
 )
-from maneuver_automaton.analysis.stability import (
-    certified_horizon,
-)
+from maneuver_automaton.analysis.stability import certified_horizon, check_closed_loop
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.receding_horizon.unconstrained import search_horizon
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon, simulate_unconstrained
 from tests.receding_horizon.unconstrained_cases import (
     MIXED,
     QUADRATIC,
@@ -24,6 +22,7 @@ from tests.receding_horizon.unconstrained_cases import (
     octaves,
     problem_of,
 )
+from tests.reference_unconstrained import index_by_program
 
 TIMES = np.arange(1, 17) / 2.0
 
@@ -31,6 +30,18 @@ TIMES = np.arange(1, 17) / 2.0
 def bound(times, bounds):
     worst = np.ones((len(times), 3))
     return GrowthBound(times=times, bounds=bounds, worst=worst, samples=1)
+
+
+@pytest.mark.parametrize("step", [0.4, 1.0])
+def test_the_index_is_what_its_linear_program_nears_as_intervals_get_short(step):
+    gaps = []
+    for h in (0.1, 0.05, 0.025):
+        times = h * np.arange(1, round(4.0 / h) + 1)
+        growth = 2.0 * (1.0 - np.exp(-times))
+        index = certified_horizon(bound(times, growth), step=step).indices[-1]
+        program = index_by_program(np.maximum(growth / h, 1.0), round(step / h))
+        gaps.append(program - index)
+    assert 0.0 < gaps[2] < 0.6 * gaps[1] < 0.36 * gaps[0]
 
 
 def test_resting_alone_gives_an_index_of_zero_in_continuous_time():
@@ -100,6 +111,26 @@ def test_near_the_goal_squares_leave_resting_as_the_best_word():
     assert certified_horizon(square, step=0.5).horizon is None
 
 
+def test_a_closed_loop_keeps_the_promise_of_its_index():
+    library, start = octaves(3), np.array([0.0, 0.8, 0.0])
+    loop = simulate_unconstrained(problem_of(library, MIXED, intervals=10), start, steps=5)
+    poses = np.concatenate([ring_poses(MIXED, levels=[0.01, 0.1, 0.64], parts=2), loop.poses[:-1]])
+    growth = growth_bound(library, MIXED, poses=poses, times=np.arange(1, 101) / 20.0)
+    index = certified_horizon(growth, step=0.5).index_at(5.0)
+    check = check_closed_loop(loop.values, loop.stage_costs, index=index)
+    assert index > 0.3
+    assert check.holds
+    assert check.steps == 5
+    assert check.cost <= check.limit
+
+
+def test_a_broken_promise_is_seen():
+    check = check_closed_loop([3.0, 2.9, 1.0], [1.0, 1.0], index=0.5)
+    assert not check.holds
+    assert check.least_decrease == pytest.approx(0.1)
+    assert check_closed_loop([3.0, 2.9], [1.0], index=-1.0).limit == math.inf
+
+
 def test_an_index_is_read_at_the_longest_horizon_below():
     growth = GrowthBound(times=[1, 2, 3], bounds=[1.0, 1.5, 1.6], worst=np.ones((3, 3)), samples=1)
     certificate = certified_horizon(growth, step=1.0)
@@ -132,6 +163,14 @@ ROWS = np.ones((2, 3))
         (
             lambda: growth_bound(even(3), MIXED, poses=np.zeros((1, 3)), times=[1.0]),
             "least: got 0.0, need positive costs: leave out the goal",
+        ),
+        (
+            lambda: check_closed_loop([1.0], [1.0], index=1.0),
+            "values: got shape (1,) for costs of shape (1,), need one more",
+        ),
+        (
+            lambda: check_closed_loop([1.0, 0.0], [0.0], index=1.0),
+            "stage_costs: got 0.0, need positive costs",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Whether the effort of a plan is uniform."""
+"""Whether the effort of a plan is uniform, and from where on a limit can matter."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.refinement.retiming import effort_report
+from maneuver_automaton.refinement.retiming import effort_report, effort_threshold
 
 MATRIX = np.array([[4.0, -1.5], [-1.5, 1.0]])
 ROBOT = Automaton.of_controls(
@@ -46,3 +46,15 @@ def test_one_trim_and_no_trim_are_uniform():
     assert empty.cost == empty.uniform_cost == 0.0
     short = effort_report(plan_of(["spin", "straight"], [2.0, 0.0]))
     assert short.uniform
+
+
+def test_the_threshold_is_the_largest_ellipse_in_the_box():
+    limits = np.array([[-2.0, 1.0], [-3.0, 3.0]])
+    r_star = effort_threshold(limits, MATRIX)
+    angles = np.linspace(0.0, 2.0 * np.pi, 100_001)
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    rim *= np.sqrt(r_star / np.einsum("ni,ij,nj->n", rim, MATRIX, rim))[:, None]
+    assert (rim >= limits[:, 0] - 1e-9).all()
+    assert (rim <= limits[:, 1] + 1e-9).all()
+    assert np.min(np.abs(rim[:, :, None] - limits)) < 1e-6
+    assert effort_threshold([[-np.inf, np.inf]]) == np.inf

@@ -10,9 +10,14 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.analysis import (
     ControlProblem,
+    QuadraticCost,
+    shifted_boundary_condition,
+    shifted_cost,
+    shifted_function,
     shifted_problem,
 )
 from maneuver_automaton.groups import SE2, SE2xR, product, translations
+from maneuver_automaton.models import moved_state
 from tests.reference_dynamics import flow
 
 POSES = arrays(np.float64, 3, elements=st.floats(-5.0, 5.0))
@@ -51,6 +56,56 @@ def test_the_same_controls_solve_the_shifted_problem_at_the_same_cost(move, star
         )
 
 
-def test_the_goal_must_fit_the_start():
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.__name__)
+@given(data=st.data())
+def test_shifted_quadratic_costs_are_the_costs_of_the_moved_back_state(group, data):
+    n, number = group.dof + 1, st.floats(-3.0, 3.0)
+    square = data.draw(arrays(np.float64, (n, n), elements=number))
+    reference, state = data.draw(arrays(np.float64, (2, n), elements=number))
+    by = group(data.draw(arrays(np.float64, group.dof, elements=number)))
+    cost = QuadraticCost(
+        state_weight=square @ square.T,
+        control_weight=np.eye(2),
+        state_reference=reference,
+        control_reference=[0.5, 0.0],
+    )
+    control, shifted = np.array([1.0, 0.2]), shifted_cost(cost, by)
+    value = cost(state, control)
+    moved = moved_state(by, state)
+    assert shifted(moved, control) == pytest.approx(value, rel=1e-9, abs=1e-9)
+    assert shifted_function(cost, by)(moved, control) == pytest.approx(value, rel=1e-9, abs=1e-9)
+
+
+@given(move=POSES, first=POSES, last=POSES)
+def test_shifted_boundary_conditions(move, first, last):
+    by = SE2(move)
+
+    def ends(a, b):
+        return np.concatenate([a - [1.0, 0.0, 0.0], b])
+
+    shifted = shifted_boundary_condition(ends, by)
+    np.testing.assert_allclose(
+        shifted(moved_state(by, first), moved_state(by, last)), ends(first, last), atol=1e-12
+    )
+
+
+def test_headings_of_quadratic_costs_are_compared_as_they_are():
+    cost = QuadraticCost(
+        state_weight=np.eye(3),
+        control_weight=np.eye(2),
+        state_reference=np.zeros(3),
+        control_reference=np.zeros(2),
+    )
+    assert cost(np.array([0.0, 0.0, 2 * np.pi]), np.zeros(2)) == pytest.approx(4 * np.pi**2)
+
+
+def test_weights_must_fit():
+    with pytest.raises(ValueError, match=r"state_weight has shape \(2, 2\), need \(3, 3\)"):
+        QuadraticCost(
+            state_weight=np.eye(2),
+            control_weight=np.eye(2),
+            state_reference=np.zeros(3),
+            control_reference=np.zeros(2),
+        )
     with pytest.raises(ValueError, match=r"goal: got shape \(4,\), need 3 components last"):
         ControlProblem(start=np.zeros(3), goal=np.zeros(4))
