@@ -109,7 +109,7 @@ def as_number(name: str, value: Any) -> float:
 
 def as_whole(name: str, value: Any) -> int:
     """A whole number that is handed in, as `as_number` reads numbers."""
-    return int(_read(name, value, "int"))
+    return int(value if value.__class__ is int else _read(name, value, "int"))
 
 
 NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {

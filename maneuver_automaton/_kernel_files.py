@@ -203,7 +203,7 @@ def name_memory(helpers: dict[str, int]) -> None:
 
 # What a kernel holds as a pickle: an error that it raises, the class of what it returns.
 UNPICKLE = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)(
-    lambda address, size, _digest: pickle.loads(ctypes.string_at(address, size))
+    functools.cache(lambda at, size, _digest: pickle.loads(ctypes.string_at(at, size)))
 )
 
 

@@ -81,8 +81,7 @@ def load_kernels(*uses: str) -> None:
     """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
     _asked.update(uses)
     for use in uses:
-        for module in USES[use]:
-            _load(f"{__package__}.{module}", "numba" in sys.modules)
+        _load(use, "numba" in sys.modules)
 
 
 def expect_many_calls() -> None:
@@ -115,9 +114,9 @@ def compiled_with(name: str) -> list[str]:
 
 
 @functools.cache
-def _load(module: str, _numba: bool) -> None:
+def _load(use: str, _numba: bool) -> None:
     for name, rows in _rows().items():
-        one: Any = kernel_named(name) if module in name else None
+        one: Any = kernel_named(name) if module_of(name) in USES[use] else None
         for n, row in enumerate(rows if hasattr(type(one), "load") else ()):  # or switched off
             if not one.load(",".join(map(stated_kind, row))):
                 one.compile(signatures_of(name)[n])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from maneuver_automaton._interrupts import stopped
 
@@ -37,8 +37,7 @@ class Watch:
         self.cost = min(self.cost, cost)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
+class Budget(NamedTuple):
     """Time until a deadline, and expansions, that a search and all its stages may take together.
 
     It is the one value that says when to stop: whatever loops is handed a budget and asks it.
@@ -105,7 +104,7 @@ class Budget:
         now = self.clock()
         seconds = max(share * self.left, at_least)
         worked = time.process_time() if self.worked > -math.inf else self.worked
-        return replace(self, began=now, deadline=now + seconds, worked=worked)
+        return self._replace(began=now, deadline=now + seconds, worked=worked)
 
     def stage(self, share: float) -> Budget:
         """Budget of one stage: a share of the time left, a large one where work is counted.
@@ -114,7 +113,7 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
-        return self if share == 1.0 else replace(self, deadline=self.clock() + share * self.left)
+        return self if share == 1.0 else self._replace(deadline=self.clock() + share * self.left)
 
     @property
     def left_to_check(self) -> float:
@@ -130,13 +129,13 @@ class Budget:
 
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""
-        return replace(self, deadline=self.deadline - seconds) if seconds else self
+        return self._replace(deadline=self.deadline - seconds) if seconds else self
 
     def less(self, spent: int) -> Budget:
         """The budget that remains after so many expansions."""
         if self.expansions is None:
             return self
-        return replace(self, expansions=max(0, self.expansions - spent))
+        return self._replace(expansions=max(0, self.expansions - spent))
 
 
 UNLIMITED = Budget(began=0.0, deadline=math.inf)

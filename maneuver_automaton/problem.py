@@ -708,15 +708,7 @@ class Problem:
 
     @property
     def ends(self) -> tuple[str | None, tuple[tuple[str | None, bool], ...]]:
-        """Trim at the start, trim and freedom of the heading at every goal: poses aside, its ends.
-
-        Examples
-        --------
-        >>> from maneuver_automaton.models import Unicycle
-        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
-        >>> Problem(robot, [0, 0, 0], Goal(pose=[1, 1, 0], free_heading=True)).ends
-        (None, ((None, True),))
-        """
+        """Trim at the start; trim and freedom of the heading at every goal: ends but for poses."""
         return self.start_trim, tuple((goal.trim, goal.free_heading) for goal in self.goals)
 
     def moved(self, by: LieGroup) -> Problem:

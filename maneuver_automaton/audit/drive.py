@@ -188,15 +188,14 @@ def stated_by(plan: Plan) -> Stated | None:
     kinds = [-1 if isinstance(one, Trim) else k for k, one in enumerate(plan.primitives)]
     for _, run in groupby(lasting, key=kinds.__getitem__):
         numbers = list(run)
-        first, *others = [plan.primitives[k] for k in numbers]
-        if isinstance(first, Maneuver):
-            rows.append(_maneuver(first, numbers[0], poses[numbers[0]]))
+        trims: list[Any] = [plan.primitives[k] for k in numbers]
+        if isinstance(trims[0], Maneuver):
+            rows.append(_maneuver(trims[0], numbers[0], poses[numbers[0]]))
             continue
-        trims: list[Any] = [first, *others]
         controls, which = np.array([one.control for one in trims]), np.array(numbers)
-        states = np.array([one.reduced_state for one in trims])
-        known = states, states, poses[which + 1], plan.twists[which], which
-        rows.append(Stated(lengths[which], controls, *known))
+        states, whole = np.array([one.reduced_state for one in trims]), len(which) == len(kinds)
+        ends, twists = (poses[1:], plan.twists) if whole else (poses[which + 1], plan.twists[which])
+        rows.append(Stated(lengths[which], controls, states, states, ends, twists, which))
     if len(rows) < 2:
         return rows[0] if rows else None
     return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))

@@ -183,11 +183,12 @@ def audit_plan(
             reason=f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}",
         )
     drive = driven(near, model)
-    missed = distance_to(drive.end, goal)
-    reasons = []
-    most = DEFECT_TOLERANCE * (1.0 + near.duration + np.abs(drive.frames.nodes).max(axis=(0, 1)))
-    if not (drive.off <= most.max() and drive.turned <= most[2]):
-        reasons.append(f"the plan is {drive.off:.3g} off the model's equations")
+    missed, reasons = distance_to(drive.end, goal), list[str]()
+    if not max(drive.off, drive.turned) <= DEFECT_TOLERANCE * (1.0 + near.duration):
+        ways = np.abs(drive.frames.nodes).max(axis=(0, 1))
+        most = DEFECT_TOLERANCE * (1.0 + near.duration + ways)
+        if not (drive.off <= most.max() and drive.turned <= most[2]):
+            reasons.append(f"the plan is {drive.off:.3g} off the model's equations")
     if not missed.position_m <= goal.tolerance_m + TERMINAL_TOLERANCE:
         reasons.append(f"it ends {missed.position_m:.3g} m from the goal")
     if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
@@ -372,7 +373,7 @@ def _beyond_limits(drive: DrivenPlan) -> list[str]:
         (model.reduced_names, model.reduced_limits, drive.sampled_states),
         (model.control_names, model.control_limits, drive.controls),
     ):
-        if ((limits[:, 0] <= values) & (values <= limits[:, 1])).all():
+        if not names or ((limits[:, 0] <= values) & (values <= limits[:, 1])).all():
             continue
         excess = np.maximum(values.max(axis=0) - limits[:, 1], limits[:, 0] - values.min(axis=0))
         for name, over, (low, high) in zip(names, excess.tolist(), limits.tolist(), strict=True):

@@ -116,14 +116,14 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
             for k, one in others
         ]
         rings += zip([k for k, _ in others], _solid_rings(given), strict=True)
-        numbers = np.repeat([k for k, _ in rings], [sum(map(len, some)) for _, some in rings])
+        numbers = np.array([k for k, _ in rings]).repeat([sum(map(len, some)) for _, some in rings])
         both = _edges([ring for _, some in rings for ring in some])
         found.append((numbers, *both, np.zeros(numbers.size)))
     for k, one in maps:
         begins, ends, radius, _ = map_outline(one, (float(origins[k, 0]), float(origins[k, 1])))
         found.append((np.full(radius.size, k), begins, ends, radius))
     owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
-    order = np.argsort(owner, kind="stable")
+    order = owner.argsort(kind="stable")
     owner, another = owner[order], np.zeros(owner.size, dtype=np.int64)
     another[1:] = owner[1:] != owner[:-1]
     return Outline(begins[order], ends[order], radius[order], another.cumsum()), owner
@@ -131,9 +131,9 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
 
 def _edges(rings: Sequence[Array]) -> tuple[Points, Points]:
     """Where the edges of rings begin and end."""
-    lasts = np.cumsum([len(ring) for ring in rings]) - 1
+    lasts = np.array([len(ring) for ring in rings]).cumsum() - 1
     following = np.arange(1, lasts[-1] + 2)
-    following[lasts] = np.append(0, lasts[:-1] + 1)
+    following[lasts] = [0, *(lasts[:-1] + 1).tolist()]
     begins = points_of(np.concatenate(rings))
     return begins, begins[following]
 
@@ -313,7 +313,7 @@ def surroundings_around(
     solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
     whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights[owners]
-    still, edges = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
+    still, edges = (index < 0).nonzero()[0], (index >= 0).nonzero()[0]
     knots = Knots.of(motions) if motions else NO_KNOTS
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == k) for k in range(len(motions)))
@@ -325,7 +325,7 @@ def surroundings_around(
         speeds=np.where(knots.arcs, fastest, 0.0),
         bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
         edges=edges,
-        firsts=np.searchsorted(index[edges], np.arange(len(motions) + 1)),
+        firsts=index[edges].searchsorted(np.arange(len(motions) + 1)),
         groups=groups,
         reaches=np.array([float((np.abs(one.begins) + one.radius).max()) for one in groups]),
     )
@@ -360,7 +360,7 @@ def _boxed(outline: Outline, still: IntArray, heights: Array) -> EdgeBoxes:
     # In columns of as many edges, and upwards within each.
     x, y = (low + high).T
     n, ranks = still.size, np.empty(still.size, dtype=np.int64)
-    ranks[np.argsort(x)] = np.arange(n)
+    ranks[x.argsort()] = np.arange(n)
     order = np.lexsort((y, ranks * math.ceil(math.sqrt(n / BLOCK)) // max(n, 1)))
     low, high, firsts = low[order], high[order], np.arange(0, n, BLOCK)
     blocks = np.minimum.reduceat(low, firsts), np.maximum.reduceat(high, firsts)

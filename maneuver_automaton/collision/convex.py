@@ -84,7 +84,7 @@ def pieces_seen_from(shapes: tuple[AnyObstacle | Shape, ...], frame: Array) -> C
         c, s = np.cos(heading), np.sin(heading)
         along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
         corners = np.array([-along - aside, along - aside, along + aside, aside - along])
-        boxes = np.round(corners.swapaxes(0, 1) + seen[begin:end, None], DIGITS).reshape(-1, 2)
+        boxes = (corners.swapaxes(0, 1) + seen[begin:end, None]).round(DIGITS).reshape(-1, 2)
         found.append(ConvexPieces(boxes, np.full(end - begin, 4), np.zeros(end - begin)))
     if kinds.discs:
         radius = np.array([one.radius for _, one in kinds.discs])
@@ -96,12 +96,12 @@ def seen_from(points: Array, frame: Array) -> Array:
     """Points (..., 2) seen from a frame (3,), rounded."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
     turned = (points - frame[:2]) @ np.array([[c, -s], [s, c]])
-    return np.asarray(np.round(turned, DIGITS) + 0.0)
+    return np.asarray(turned.round(DIGITS) + 0.0)
 
 
 def _plain_pieces(corners: Array, counts: IntArray) -> ConvexPieces:
     """Pieces of polygons without holes; the convex ones are found all at once."""
-    first, after = np.cumsum(counts) - counts, np.arange(len(corners)) + 1
+    first, after = counts.cumsum() - counts, np.arange(len(corners)) + 1
     after[first + counts - 1] = first
     edge = corners[after] - corners
     following = edge[after]
@@ -140,23 +140,22 @@ def solids_of(pieces: ConvexPieces) -> Solids:
     """Arrays of pieces for the kernels."""
     corners, counts, radius = pieces
     first = np.zeros(counts.size + 1, dtype=np.int64)
-    np.cumsum(counts, out=first[1:])
+    counts.cumsum(out=first[1:])
     if not counts.size:
         return Solids(np.zeros((0, 5)), first, np.zeros((0, 5)))
-    begins = first[:-1]
-    before = np.arange(-1, len(corners) - 1)
+    begins, before = first[:-1], np.arange(-1, len(corners) - 1)
     before[begins] = first[1:] - 1
     edge = corners - corners[before]
     length = np.hypot(edge[:, 0], edge[:, 1])
     short = length < TINY_EDGE
     if short.any():
-        single = np.repeat(counts == 1, counts)
+        single = (counts == 1).repeat(counts)
         if not (length[~single] > 0.0).all():  # corners that rounding has made one
             return solids_of(pieces_of(itertools.starmap(_without_repeats, pieces.each())))
         length[single], short = 1.0, short & ~single
     normal = edge[:, ::-1] * (1.0, -1.0) / length[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
-    for k in np.flatnonzero(short):  # its normal is rounded, like its ends
+    for k in short.nonzero()[0].tolist():  # its normal is rounded, like its ends
         piece = int(np.searchsorted(first, k, side="right")) - 1
         offset[k] = (corners[first[piece] : first[piece + 1]] @ normal[k]).max()
     around = radius[:, None]

@@ -8,8 +8,10 @@ what counts. Moving obstacles are left to two others: the proof in the search, a
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import threading
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -20,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Shape, by_kind
+from maneuver_automaton.collision.shapes import AnyObstacle, Shape, box_corners, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
     LEAST_TURN,
@@ -107,7 +109,7 @@ class FclChecker:
         if lasting.size and not lasting.min() >= 0.0:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
         laid = self._ground.laid
-        if not laid.rows.all():
+        if not laid.is_whole:
             laid = self._laid_near(*_coasted_within(here, twists, lasting))
         return self._first_hit(here, twists, lasting, laid, ask)
 
@@ -177,18 +179,15 @@ class FclChecker:
                 one = slice(begin, end)
                 if hit := self._first_hit(poses[0, one], steps[one], np.ones(1), laid, ask):
                     return begin, hit[1]
-            elif self._sweep_hits(poses[:, begin:end], steps[begin:end], laid):
+                continue
+            x, y, turn = steps[begin:end].sum(axis=0).tolist()
+            pieces = cut_where_it_pivots(self._body, (x, y, turn))
+            whole = np.concatenate([poses[0, begin:end], poses[1, end - 1 : end]])
+            solid = _object(body_skin(swept_hulls(pieces, whole, steps[begin:end])))
+            if _touching([solid], np.zeros((1, 3)), laid.static):
                 middle = (begin + end) // 2
                 close += [(middle, end), (begin, middle)]
         return None
-
-    def _sweep_hits(self, poses: Array, steps: Array, laid: _Laid) -> bool:
-        """Whether one solid around the body along a few steps touches a static obstacle."""
-        x, y, turn = steps.sum(axis=0).tolist()
-        pieces = cut_where_it_pivots(self._body, (x, y, turn))
-        whole = np.concatenate([poses[0], poses[1, -1:]])
-        solid = _object(body_skin(swept_hulls(pieces, whole, steps)))
-        return bool(_touching([solid], np.zeros((1, 3)), laid.static))
 
     def _first_hit(
         self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
@@ -196,13 +195,13 @@ class FclChecker:
         """The first of some coasts that touches a static obstacle, and which."""
         if laid.static is None:
             return None
-        kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
-        coasts = list(zip(kinds, durations.tolist(), strict=True))
-        for k, (kind, time) in enumerate(coasts):
-            if _speed(self._body, kind) * time <= STANDING:
-                coasts[k] = kind, 0.0
-        standing = np.array([k for k, (_, time) in enumerate(coasts) if not time], dtype=np.int64)
-        first = self._first_pose_hit(starts[standing], standing, laid)
+        body, kinds = self._body, [(x, y, turn) for x, y, turn in twists.tolist()]
+        coasts = [
+            (kind, time if _speed(body, kind) * time > STANDING else 0.0)
+            for kind, time in zip(kinds, durations.tolist(), strict=True)
+        ]
+        still = [k for k, (_, time) in enumerate(coasts) if not time]
+        first = self._first_pose_hit(starts[still], np.array(still), laid) if still else None
         parts = windows(coasts)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
@@ -210,9 +209,8 @@ class FclChecker:
         while parts.coast.size:
             ask()
             of = parts.coast
-            slices = list(zip(of.tolist(), parts.level.tolist(), strict=True))
-            made = {(k, level): _sliced(self._body, kinds[k], level) for k, level in set(slices)}
-            solids = [made[one] for one in slices]
+            slices = zip(of.tolist(), parts.level.tolist(), strict=True)
+            solids = [_sliced(body, kinds[k], level) for k, level in slices]
             poses = coasted_at(starts, twists, of, parts.begins)
             hits = _touching([solid for solid, _ in solids], poses, laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
@@ -252,6 +250,7 @@ class _Laid(NamedTuple):
     rows: NDArray[np.bool_]  # (n,) which of all
     static: Any  # one object for all of them, None without
     owners: IntArray  # which obstacle each of its triangles belongs to
+    is_whole: bool  # no obstacle is left out
 
 
 @dataclass(slots=True, eq=False)
@@ -267,7 +266,7 @@ class _Ground:
     def near(self, boxes: Array) -> _Laid:
         """All obstacles that meet one of some boxes (m, 4), and others."""
         laid = self.laid
-        if laid.rows.all():
+        if laid.is_whole:
             return laid
         low_x, low_y, high_x, high_y = self.boxes.T[:, :, None]
         meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
@@ -275,12 +274,12 @@ class _Ground:
         rows = laid.rows | meets.any(axis=1)
         if not (rows & ~laid.rows).any():
             return laid
-        which = np.flatnonzero(rows)
+        which = rows.nonzero()[0]
         found = tuple(self.obstacles[k] for k in which.tolist())
         skin, of = obstacle_skin(found, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
-        self.laid = laid = _Laid(rows, static, self.numbers[which][of])
+        self.laid = laid = _Laid(rows, static, self.numbers[which][of], bool(rows.all()))
         return laid
 
 
@@ -295,13 +294,12 @@ def _ground_of(
     seen = tuple(obstacles[k] for k in static)
     if any(origin):
         seen = tuple(one.moved(SE2(np.array([-origin[0], -origin[1], 0.0]))) for one in seen)
-    nothing = np.zeros(0, dtype=np.int64)
     return _Ground(
         obstacles=seen,
         numbers=np.array(static, dtype=np.int64),
         boxes=_boxes_around(seen),
         excess=excess,
-        laid=_Laid(np.zeros(len(seen), dtype=np.bool_), None, nothing),
+        laid=_Laid(np.zeros(len(seen), np.bool_), None, np.zeros(0, np.int64), not seen),
     )
 
 
@@ -313,19 +311,14 @@ def _boxes_around(obstacles: tuple[AnyObstacle, ...]) -> Array:
     for k, one in kinds.maps:  # wherever it is turned
         far = np.hypot(*one.extent)
         boxes[k] = *(one.origin[:2] - far), *(one.origin[:2] + far)
-    if kinds.boxes:
-        sizes, heading = kinds.sizes, kinds.headings[:, None]
-        far = 0.5 * (np.abs(np.cos(heading)) * sizes + np.abs(np.sin(heading)) * sizes[:, ::-1])
-        ends = kinds.centers - far, kinds.centers + far
-        boxes[kinds.boxes] = np.concatenate(ends, axis=1)
-    if kinds.polygons:
-        counts = np.array([len(one.corners) for _, one in kinds.polygons])
-        corners = np.concatenate([one.corners for _, one in kinds.polygons])
-        begins = np.cumsum(counts) - counts
+    rings = {k: one.corners for k, one in kinds.polygons}
+    rings |= zip(kinds.boxes, box_corners(kinds.centers, kinds.headings, kinds.sizes), strict=True)
+    if rings:
+        begins = [0, *itertools.accumulate(map(len, rings.values()))][:-1]
+        corners = np.concatenate(list(rings.values()))
         ends = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
-        boxes[[k for k, _ in kinds.polygons]] = np.concatenate(ends, axis=1)
-        # refuses one without area
-        outlines_of([one for _, one in kinds.polygons if not one.is_plain])
+        boxes[list(rings)] = np.concatenate(ends, axis=1)
+    outlines_of([one for _, one in kinds.polygons if not one.is_plain])  # refuses one without area
     return boxes
 
 
@@ -379,6 +372,14 @@ def _object(skin: Skin) -> Any:
     return fcl.CollisionObject(model)
 
 
+class _Numbers(array):  # type: ignore[type-arg]
+    """What FCL reads as an array of NumPy, without the copy that it makes of one."""
+
+    def astype(self, _kind: type) -> _Numbers:
+        """Itself."""
+        return self
+
+
 def _touching(
     ones: Sequence[Any], poses: Array, other: Any, *, most: int | None = None
 ) -> dict[int, int]:
@@ -387,14 +388,12 @@ def _touching(
 
     collide, result = fcl.collide, fcl.CollisionResult()
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
-    places = np.zeros((len(poses), 3))
-    places[:, :2] = poses[:, :2]
-    half = 0.5 * poses[:, 2]
+    x, y, turn = poses.T
+    half, place, hits = 0.5 * turn, _Numbers("d", (0.0, 0.0, 0.0)), dict[int, int]()
     # Turns as quaternions in plain numbers: to hand over a matrix takes as long as some answers.
-    turns = zip(np.cos(half).tolist(), np.sin(half).tolist(), strict=True)
-    hits: dict[int, int] = {}
+    seen = zip(x.tolist(), y.tolist(), np.cos(half).tolist(), np.sin(half).tolist(), strict=True)
     with _ONE_AT_A_TIME:
-        for k, (one, (w, z), place) in enumerate(zip(ones, turns, places, strict=True)):
+        for k, (one, (place[0], place[1], w, z)) in enumerate(zip(ones, seen, strict=True)):
             one.setQuatRotation((w, 0.0, 0.0, z))
             one.setTranslation(place)
             if collide(one, other, request, result):

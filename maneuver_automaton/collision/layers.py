@@ -43,7 +43,7 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
     """All obstacles that stand anywhere between neighbouring heights; no band without any."""
     layers = layers_of(obstacles, in_space=in_space)
     heights = {height for layer in layers for height in (layer.low, layer.high)}
-    bands, kept = [], sorted(heights)
+    bands, kept = (list[Layer](), sorted(heights)) if in_space else ([*layers], [])
     while len(kept) - 1 > MOST_LAYERS:  # the thinnest band joins its lower neighbour
         thinnest = int(np.argmin(np.diff(kept)))
         del kept[max(thinnest, 1)]

@@ -165,10 +165,12 @@ class Box:
 
 def box_corners(centers: Array, headings: Array, sizes: Array) -> Array:
     """Corners (n, 4, 2) of boxes [m], as of each, from arrays of what boxes have."""
-    signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    frames = np.empty((len(centers), 1, 3))
-    frames[:, 0, :2], frames[:, 0, 2] = centers, headings
-    return SE2(frames).act(signs * sizes[:, None])
+    cosine, sine = np.cos(headings)[:, None], np.sin(headings)[:, None]
+    x, y = sizes[:, :1] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1:] * [-0.5, -0.5, 0.5, 0.5]
+    corners = np.empty((len(centers), 4, 2))
+    corners[..., 0] = centers[:, :1] + (cosine * x - sine * y)
+    corners[..., 1] = centers[:, 1:] + (sine * x + cosine * y)
+    return corners
 
 
 Shape: TypeAlias = Polygon | Disc | Box

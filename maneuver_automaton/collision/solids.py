@@ -99,8 +99,8 @@ def obstacle_skin(obstacles: tuple[AnyObstacle, ...], *, excess: float) -> tuple
         rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
         parts.append(_on_quads(SE2(one.origin).act(rings)))
     counts = [len(QUAD)] * (len(kinds.boxes) + len(fours)) + [len(one.triangles) for one in parts]
-    owners = np.repeat(numbers, counts)
-    whole, order = _together([*quads, *parts]), np.argsort(owners, kind="stable")
+    owners = np.array(numbers, dtype=np.int64).repeat(counts)
+    whole, order = _together([*quads, *parts]), owners.argsort(kind="stable")
     return Skin(whole.vertices, whole.triangles[order]), owners[order]
 
 

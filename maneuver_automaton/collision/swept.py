@@ -229,7 +229,7 @@ def windows(coasts: Iterable[tuple[Twist, float]]) -> Windows:
         count = math.ceil(lasts / length)
         coast += [k] * count
         levels += [level] * count
-        begins += [min(n * length, lasts - length) for n in range(count)]
+        begins += [n * length for n in range(count - 1)] + [lasts - length] * (count > 0)
     numbers = np.array([coast, levels], dtype=np.int64)
     return Windows(numbers[0], numbers[1], np.array(begins, dtype=np.float64))
 

@@ -72,7 +72,7 @@ def by_a_refuge(
     as soon as rests along that way allow.
     """
     best: Word | None = None
-    counted = replace(budget, expansions=EXPANSIONS)
+    counted = budget._replace(expansions=EXPANSIONS)
     for pose in refuges(problem, query, way):
         if budget.is_over:
             break
@@ -508,7 +508,7 @@ class FleetMember:
 
     def _first(self, query: LatticeQuery, budget: Budget, most: int) -> FirstPlan:
         """The first word that a search finds with so many expansions, which are counted."""
-        first = first_plan(query, budget=replace(budget, expansions=most))
+        first = first_plan(query, budget=budget._replace(expansions=most))
         self.expansions += first.expansions
         return first
 

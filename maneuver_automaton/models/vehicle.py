@@ -62,13 +62,13 @@ class Vehicle:
 
     def _limits(self, names: Sequence[str]) -> Array:
         """Limits (n, 2) by `max_NAME` and `min_NAME`, which is its negative if left out."""
-        limits = np.empty((len(names), 2))
-        for row, name in zip(limits, names, strict=True):
+        limits = []
+        for name in names:
             one = LIKE.get(name, name)
             most, least = getattr(self, f"max_{one}"), getattr(self, f"min_{one}", None)
             most = math.inf if most is None else most
-            row[:] = -most if least is None else least, most
-        return limits
+            limits.append((-most if least is None else least, most))
+        return np.array(limits, dtype=np.float64).reshape(-1, 2)
 
     def velocity(self, z: Components, u: Components, /) -> Components:
         """Components of the twist xi(z, u), in the order of the pose."""

@@ -209,7 +209,7 @@ class _Legs:
         search = replace(question.search, improve=more and question.search.improve)
         question = replace(question, search=replace(search, max_expansions=most))
         part = budget if more else budget.part(LEG_SHARE, at_least=LEAST_TIME)
-        part = replace(part, shows=None, watch=None, expansions=most)
+        part = part._replace(shows=None, watch=None, expansions=most)
         result = self.answer(question, part, self.found.workspace, alternatives=0)
         self.spent += max(result.counts.get("expansions", 0), LEAST_WORK)
         self.found.counts.update(result.counts)

@@ -103,7 +103,7 @@ class AmongZones(PlanningStep):
                 waits = False
             none = is_over and not (found.plans or budget.is_over)
             if k == 0 and itself and result.plan is not None and none:
-                part = replace(budget.part(CROSSED_SHARE, at_least=LEAST_TIME), shows=None)
+                part = budget.part(CROSSED_SHARE, at_least=LEAST_TIME)._replace(shows=None)
                 crossed = crossed_slowly(problem, result.plan, self.search, part, found.workspace)
                 if crossed is not None and found.may_check:
                     found.offer(*crossed)

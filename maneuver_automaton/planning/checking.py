@@ -324,9 +324,7 @@ def _coasts_within_reach(
         low = layer.low - problem.body_height[1] - problem.margin - start[:, 3]
         high = layer.high - problem.body_height[0] + problem.margin - start[:, 3]
         climb = velocity[:, 3]
-        with np.errstate(
-            divide="ignore", invalid="ignore"
-        ):  # what does not climb stays where it is
+        with np.errstate(divide="ignore", invalid="ignore"):  # what is level stays where it is
             meets = np.sort([low / climb, high / climb], axis=0)
         level, within = climb == 0.0, (low <= 0.0) & (high >= 0.0)
         first = np.where(level, 0.0, np.clip(meets[0], 0.0, lasting))

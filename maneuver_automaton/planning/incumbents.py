@@ -140,7 +140,7 @@ class Incumbents:
     @property
     def for_checks(self) -> Budget:
         """The budget of a check: that of a first plan comes after the time, if need be."""
-        return self.budget if self.plans else replace(self.budget, late=FIRST_LATE)
+        return self.budget if self.plans else self.budget._replace(late=FIRST_LATE)
 
     @property
     def may_check(self) -> bool:
@@ -248,8 +248,8 @@ class Incumbents:
         while waiting and (turns == 0 or not (budget.is_over or self.is_enough)):
             k, question = waiting.popleft()
             share = 1.0 if not waiting else shares[k] if shares else 1.0 / (1 + len(waiting))
-            part = replace(budget.part(share, at_least=LEAST_TIME), shows=better)
-            part = replace(part, expansions=question.search.max_expansions)
+            part = budget.part(share, at_least=LEAST_TIME)._replace(shows=better)
+            part = part._replace(expansions=question.search.max_expansions)
             shift, turn = budget.elapsed, turns // len(questions)
 
             def quits(until: float = shift + moment * 2.0**turn) -> bool:
@@ -258,7 +258,7 @@ class Incumbents:
 
             soon = moment > SOON and turn < SOON_TURNS and part.expansions is None
             if soon and waiting:
-                part = replace(part, quits=quits)
+                part = part._replace(quits=quits)
             result = search(question, part, self.workspace, alternatives=alternatives)
             at = tuple((shift + at, cost) for at, cost in result.improvements)
             result = replace(result, improvements=at)
@@ -358,7 +358,7 @@ class Incumbents:
         same = [other for other in self.plans if same_motion(plan, other.plan, self.likeness)]
         if not any(other.rank <= one.rank for other in same):
             others = [other for other in self.plans if other not in same]
-            self.plans = sorted([*others, one], key=lambda other: other.rank)
+            self.plans = sorted([*others, one], key=lambda other: other.rank) if others else [one]
             if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
                 self.least_cost = cost
                 self.improvements.append((self.budget.elapsed, cost))

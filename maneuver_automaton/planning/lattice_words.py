@@ -168,7 +168,7 @@ class LatticeWords(PlanningStep):
             found.counts.update(expansions=search.expansions)
         elif problem.moves and known:  # one with rests, if a quick search finds none
             most = QUICK if limit.expansions is None else min(QUICK, limit.expansions)
-            first = first_plan(query, budget=replace(limit, expansions=most), table=self.table)
+            first = first_plan(query, budget=limit._replace(expansions=most), table=self.table)
             self._count(first, searches=1)
             word = first.word
             if word is None:
@@ -205,7 +205,7 @@ class LatticeWords(PlanningStep):
     def for_others(self) -> Budget:
         """The budget that remains, less the time to check what is found."""
         left, better = self.budget, self.found.for_better
-        return replace(left, deadline=min(left.deadline, better.deadline))
+        return left._replace(deadline=min(left.deadline, better.deadline))
 
     @property
     def finds_plans(self) -> bool:
@@ -268,7 +268,8 @@ class LatticeWords(PlanningStep):
     def _count(self, search: FirstPlan | WordSearch, **more: int) -> None:
         self.spent += search.expansions
         counts = {"expansions": search.expansions, "collision_queries": search.queries}
-        self.found.counts.update(counts | more if self.finds_plans else counts)
+        for name, n in (counts | more if self.finds_plans else counts).items():
+            self.found.counts[name] += n
 
     def improved(self) -> list[Candidate]:
         """Plans to be checked, the cheapest first: what was found, and others if asked for."""
@@ -325,13 +326,13 @@ class LatticeWords(PlanningStep):
         if self.query.problem.place_costs:  # whose best times are found after that
             left = left.part(1.0 - TIMES_SHARE)
         most = None if left.expansions is None else int(share * left.expansions)
-        return replace(left.part(share), expansions=most)
+        return left.part(share)._replace(expansions=most)
 
     def _let_pass(self) -> None:
         """Note the cheapest path among static obstacles, with rests that let others pass."""
         query, static = self.query, _among_static(self.query)
         soon = self.limit.part(PASSING_SHARE)
-        in_time = replace(soon, expansions=None)
+        in_time = soon._replace(expansions=None)
         better = self.words_of(static, in_time, most=soon.expansions, patience=BRIEF)
         if better.first is None or better.first.word is None:
             return
@@ -360,7 +361,7 @@ class LatticeWords(PlanningStep):
         """Note the word of another query with the same maneuvers, if it costs less than known."""
         query, left = self.query, self.for_others
         most = None if left.expansions is None else int(counted * left.expansions)
-        left = replace(left.part(share), expansions=most)
+        left = left.part(share)._replace(expansions=most)
         other = other if self.finds_plans else late_at_first(other)
         word = self.words_of(other, left, patience=AT_ONCE).word
         if word is NO_WORD:

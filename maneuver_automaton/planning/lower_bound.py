@@ -92,7 +92,7 @@ def lower_bound(
         workspace = workspace_of(problem.obstacles)
         prepare_steps(problem, workspace)
         brief = replace(problem, search=replace(problem.search, max_expansions=EXPANSIONS))
-        part = replace(budget.part(PLANNING), expansions=EXPANSIONS)
+        part = budget.part(PLANNING)._replace(expansions=EXPANSIONS)
         cost = answer(brief, part, workspace, alternatives=0).cost
         incumbent = watch.cost = math.inf if cost is None else cost
     proving = Proving(problem, budget, watch, max_work=max_work)

@@ -45,7 +45,7 @@ UNPROVEN = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 def before_proof(budget: Budget) -> Budget:
     """The budget of a search for a first plan: the last share of the time is for the proof."""
-    return replace(budget, deadline=budget.deadline - RESERVED * budget.seconds)
+    return budget._replace(deadline=budget.deadline - RESERVED * budget.seconds)
 
 
 def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
@@ -183,7 +183,7 @@ class _Following:
 
         left, query, answer = budget.left, self.query, Reachability.CONNECTED
         load_kernels("separation")  # the compiler's time is not the budget's
-        budget = replace(budget, deadline=budget.clock() + left)
+        budget = budget._replace(deadline=budget.clock() + left)
         if not len(self.path):
             answer, poses, apart = widest_path(
                 query.problem,

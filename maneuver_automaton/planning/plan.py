@@ -136,12 +136,12 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
-    budget = replace(budget, shows=shows) if shows else budget
+    budget = budget._replace(shows=shows) if shows else budget
     with patient():
         if gap is None:
             if watch is not None:
                 watch.problem = problem
-                budget = replace(budget, watch=watch)
+                budget = budget._replace(watch=watch)
             result = answer(problem, budget, workspace, alternatives=alternatives)
         else:
             watch = watch or Watch(gap=gap)

@@ -217,7 +217,7 @@ def plan_to_gap(
     thread = _Beside(functools.partial(proving.run, after_a_plan=True))
     thread.start()
     try:
-        result = search(replace(budget, watch=watch))
+        result = search(budget._replace(watch=watch))
         if result.plan is not None and result.cost is not None:
             watch.cost = result.cost
             while thread.is_alive() and not (watch.is_closed or budget.is_over):

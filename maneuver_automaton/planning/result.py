@@ -28,14 +28,6 @@ class Workspace:
     """One map, as searches, FCL and the audit see it, and what searches know of their vehicle.
 
     What FCL and the audit know stays as long as it is held; searches keep what was made last.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Disc, Obstacle
-    >>> workspace = Workspace((Obstacle(Disc(1.0)),))
-    >>> one = workspace.checker((), workspace.obstacles, 0.1, (0.0, 0.0), proven=1e-3)
-    >>> one is workspace.checker((), workspace.obstacles, 0.1, (0.0, 0.0), proven=1e-3)
-    True
     """
 
     obstacles: tuple[AnyObstacle, ...]

@@ -15,7 +15,7 @@ import numpy as np
 
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
-from maneuver_automaton.automaton import validation
+from maneuver_automaton.automaton import Automaton, validation
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models.speeds import steers_at_rest
@@ -200,23 +200,25 @@ def uses_lattice(problem: Problem) -> bool:
     rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
     refused.
     """
-    return _uses_lattice(problem.setting)  # whatever its ends
+    method, automaton = problem.search.method, problem.automaton
+    placed = bool(problem.place_costs) and method in ("auto", "lattice")
+    climbs = problem.start.size > 3 and automaton.is_kinematic
+    if problem.climbs_among_obstacles or (climbs and placed):
+        return True
+    steers, rests = _steers(automaton)
+    if not steers or (problem.horizon.time is not None and not rests):
+        return False
+    return placed or method == "lattice" or (method == "auto" and bool(problem.obstacles))
 
 
 @kept_by_first
-def _uses_lattice(problem: Problem) -> bool:
-    method = problem.search.method
-    placed = bool(problem.place_costs) and method in ("auto", "lattice")
-    climbs = problem.start.size > 3 and problem.automaton.is_kinematic
-    if problem.climbs_among_obstacles or (climbs and placed):
-        return True
-    velocities = problem.automaton.body_velocities
+def _steers(automaton: Automaton) -> tuple[bool, bool]:
+    """Whether trims lead to more than one side in the plane, and whether any stands still."""
+    velocities = automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
     sides = moving[:, 2].any() or np.linalg.matrix_rank(moving[:, :2]) == 2
-    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
-    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
-        return False
-    return placed or method == "lattice" or (method == "auto" and bool(problem.obstacles))
+    steers = len(moving) > 1 and bool(sides) and velocities.shape[1] == 3
+    return steers, len(moving) < len(velocities)
 
 
 class FreeEnds(PlanningStep):

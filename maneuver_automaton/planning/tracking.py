@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -147,7 +147,7 @@ def track(
         table=table,
         first=functools.partial(first_plan, aside=aside, is_proven=proven),
     )
-    found = words_of(query, budget=replace(budget, expansions=None), schedule=schedule, known=word)
+    found = words_of(query, budget=budget._replace(expansions=None), schedule=schedule, known=word)
     for _ in found:
         pass
     if found.word is NO_WORD:

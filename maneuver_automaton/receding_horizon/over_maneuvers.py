@@ -176,7 +176,7 @@ class OverManeuvers(StepSearch):
         query = lattice_query(problem, goals)
         best: StepPlan | None = None
         budget = self.now.budget.part(HEEDLESS_SHARE) if first else self.for_plans
-        budget = replace(budget, expansions=problem.search.max_expansions)
+        budget = budget._replace(expansions=problem.search.max_expansions)
         for word in words_of(query, budget=budget, schedule=WordSchedule()):
             owner = query.goal_index[word.goal]
             for plan in fitted_plans(problem, plan_of_word(query, word), problem.goals[owner]):

@@ -125,7 +125,7 @@ def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
     schedule = WordSchedule(most=most, patience=BRIEF, table=cost_to_go_table(problem))
-    timed = replace(budget, expansions=None)
+    timed = budget._replace(expansions=None)
     found = words_of(query, budget=timed, schedule=schedule).to_the_end()
     words = (found.word, *found.others[:OTHERS]) if found.word is not NO_WORD else ()
     yield from (plan_of_word(query, word) for word in words)

@@ -221,7 +221,7 @@ class WordSearch:
         """Words, each cheaper than the one before: a first one, itself shortened, then others."""
         if self.best is NO_WORD:
             most, table = self.schedule.most, self.schedule.table
-            counted = self.budget if most is None else replace(self.budget, expansions=most)
+            counted = self.budget if most is None else self.budget._replace(expansions=most)
             first = self.first = self.schedule.first(self.query, budget=counted, table=table)
             self.expansions, self.queries, self.passes = first.expansions, first.queries, 1
             if first.word is None:

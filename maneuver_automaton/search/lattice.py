@@ -125,7 +125,7 @@ def first_plan(
                 break
         if aside and (ends or total >= due) and word is None and not proof and total < room:
             until = budget.clock() + (1.0 if ends else ASIDE_SHARE) * budget.left
-            other = aside(replace(budget, deadline=until, expansions=room - total))
+            other = aside(budget._replace(deadline=until, expansions=room - total))
             word, total = other.word, total + other.expansions
             queries += other.queries
             if other.exhausted:

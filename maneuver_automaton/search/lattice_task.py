@@ -87,9 +87,9 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
     aims, roots = (goals, start) if sign > 0.0 else (start, goal_roots(query))
     timed, limits = query.moves or math.isfinite(query.most_time), limits_of(query)
     settings, count, coast = query.problem.search, limits.most_trims, limits.least_coast
-    known, layers = _sizes(query.library, settings, resolution, timed, count, coast)
-    cells = known.cells
-    cells = cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
+    asked = settings.cell, settings.headings
+    known, layers = _sizes(query.library, asked, resolution, timed, count, coast)
+    cells = known.cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
     least, most = query.library.interval  # as a connection takes as long as some expansions
     least *= len(query.goals)
     back_off = float(max(back_off_of(query.library), 2.0 * query.margin))
@@ -117,14 +117,14 @@ NO_ENDS = EndArrays(np.zeros((0, 4)), np.zeros(0, dtype=np.int64), np.zeros(0, d
 @kept_by_first
 def _sizes(
     library: LatticeLibrary,
-    settings: SearchSettings,
+    asked: tuple[float | None, int | None],
     resolution: Resolution,
     timed: bool,
     most_trims: int,
     least_coast: float,
 ) -> tuple[Task, int]:
     """What tasks of all queries share, their own values left open; the layers of their cells."""
-    cell = resolution.scale * (settings.cell or library.cell)
+    cell = resolution.scale * (asked[0] or library.cell)
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
     by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
@@ -138,7 +138,7 @@ def _sizes(
         cells=CellSizes(
             frame=(0.0, 0.0, 0.0, 1.0, 0.0),
             cell=float(cell),
-            headings=int(settings.headings or HEADINGS),
+            headings=int(asked[1] or HEADINGS),
             fine_cell=float(resolution.fine * cell),
             fine_headings=FINE_HEADINGS,
             rise=float(resolution.scale * RISE * library.radius),
