@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.metadata
 import json
 import re
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton.cli.entry import compile_methods_later
 from tests.test_house import imports_of, trees
 
 HEAVY = ("numba", "scipy", "networkx", "matplotlib", "fcl", "casadi", "pydantic", "shapely", "yaml")
@@ -100,6 +102,27 @@ for name in "planning.unheard", "planning.plan.unheard", "receding_horizon.unhea
 assert receding_horizon.Step.__module__ == "maneuver_automaton.receding_horizon.log"
 """
     assert "maneuver_automaton.planning.plan" in modules_after(code)
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 13), reason="compiles the methods of a class at once")
+def test_methods_of_a_value_are_compiled_when_they_are_called(monkeypatch):
+    monkeypatch.setitem(vars(dataclasses), "_create_fn", vars(dataclasses)["_create_fn"])
+    compile_methods_later()
+    home = {"__module__": "maneuver_automaton"}
+    options = {"frozen": True, "slots": True, "order": True}
+    fields = [("left", int), ("right", int, dataclasses.field(default=2))]
+    pair = dataclasses.make_dataclass("Pair", fields, namespace=home, **options)
+    wider = dataclasses.make_dataclass("Wider", ["last"], bases=(object,), namespace=home)
+    given = vars(pair)["__init__"]
+    with pytest.raises(TypeError, match=r"^Pair\.__init__\(\) missing 1 .* argument: 'left'$"):
+        pair()
+    assert vars(pair)["__init__"] is not given
+    assert pair(1) == pair(left=1, right=2) < pair(2) != wider(2)
+    assert {pair(1), pair(1, 2)} == {pair(1)}
+    assert repr(pair(1)) == "Pair(left=1, right=2)"
+    for change in (lambda: setattr(pair(1), "left", 3), lambda: delattr(pair(1), "left")):
+        with pytest.raises(dataclasses.FrozenInstanceError, match="field 'left'"):
+            change()
 
 
 def test_values_are_those_of_their_rooms():

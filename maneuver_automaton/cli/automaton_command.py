@@ -220,8 +220,15 @@ def design(
         save_library(designed.automaton, path)
     if not quiet:
         _print_designed(path, designed)
-    if plot:
-        _draw_factor(designed, path.with_suffix(".png"), quiet=quiet)
+    picture = path.with_suffix(".png")
+    if plot and designed.words is None:
+        complain(f"{picture}: not drawn: the factor of words of any length is one for all goals")
+    elif plot:
+        plotting = ready_to_draw()
+        with writing(picture):
+            plotting.save_factor_figure(designed.words, picture)
+        if not quiet:
+            say(str(picture))
     if not designed.holds:
         remedy = "allow longer words (max_trims)"
         if designed.any_length > designed.within:
@@ -253,18 +260,6 @@ def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bo
             f"{done.farthest}; no choice of as many has less than {done.at_least:.4g} m"
         )
     return FOUND
-
-
-def _draw_factor(designed: DesignedLibrary, path: Path, *, quiet: bool) -> None:
-    """The factor over the goals; without short words it is the same everywhere, and not drawn."""
-    if designed.words is None:
-        complain(f"{path}: not drawn: the factor of words of any length is one for all goals")
-        return
-    plotting = ready_to_draw()
-    with writing(path):
-        plotting.save_factor_figure(designed.words, path)
-    if not quiet:
-        say(str(path))
 
 
 def _print_designed(path: Path, designed: DesignedLibrary) -> None:

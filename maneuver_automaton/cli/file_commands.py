@@ -102,20 +102,17 @@ def compile_all(*, jobs: int | None) -> int:
     return BAD_INPUT if failed else FOUND
 
 
-def _list_scenarios() -> int:
-    """List the scenarios with a line each, and the command that they are for."""
-    found = {name: _content(path) for name, path in sorted(_scenarios().items())}
-    width = max(map(len, found))
-    for name, content in found.items():
-        command = "mpc" if "receding_horizon" in content else "plan"
-        say(f"{name:<{width}}  {command:<4}  {content['name']}")
-    return FOUND
-
-
 def example(name: str | None, out: Path | None) -> int:
-    """Write a scenario, and the files that it names, as NAME.yaml, as the file or into a folder."""
+    """Write a scenario, and the files that it names, as NAME.yaml, as the file or into a folder.
+
+    Without a name, list the scenarios with a line each, and the command that they are for.
+    """
     if name is None:
-        return _list_scenarios()
+        found = {name: _content(path) for name, path in sorted(_scenarios().items())}
+        for known, content in found.items():
+            command = "mpc" if "receding_horizon" in content else "plan"
+            say(f"{known:<{max(map(len, found))}}  {command:<4}  {content['name']}")
+        return FOUND
     source = _source(name)
     target = Path() / source.name if out is None else out
     if target.is_dir() or (out is not None and not out.suffix):
@@ -185,7 +182,12 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
         )
     with writing(target):
         if ending not in YAML_ENDINGS:
-            cells = _only_map(source, parts)
+            several = statements_of(source)
+            cells = _one_map(
+                _obstacles(problem_of(source, parts)) if several is None else several[0].obstacles
+            )
+            if cells is None:
+                raise InvalidScenario(f"{source}: states no occupancy map, or several; need one")
             make_folder(target.parent)
             of_maps.write(cells, target)
         elif parts == Parts() and (plain := _plain_map(source)) is not None:
@@ -226,18 +228,6 @@ def _plain_map(source: Path) -> OccupancyMap | None:
     if statements is None or len(statements) > 1 or statements[0].vehicle is not None:
         return None
     return _one_map(statements[0].obstacles)
-
-
-def _only_map(source: Path, parts: Parts) -> OccupancyMap:
-    """The one map of a file, which may be among other obstacles."""
-    statements = statements_of(source)
-    obstacles = (
-        _obstacles(problem_of(source, parts)) if statements is None else statements[0].obstacles
-    )
-    cells = _one_map(obstacles)
-    if cells is None:
-        raise InvalidScenario(f"{source}: states no occupancy map, or several; need one")
-    return cells
 
 
 def _obstacles(scenario: Scenario | FleetScenario) -> tuple[AnyObstacle, ...]:

@@ -102,13 +102,10 @@ class Draughtsman:
         """Have it draw; False where it cannot be told what."""
         try:
             order = pickle.dumps((draw, args))
-        except Exception:  # noqa: BLE001, a model may hold functions that have no name
-            return False
-        try:
             with os.fdopen(self.pipe, "wb") as pipe:
                 self.pipe = -1
                 pipe.write(order)
-        except OSError:  # it is gone
+        except Exception:  # noqa: BLE001, a model may hold functions without a name; or it is gone
             return False
         return True
 

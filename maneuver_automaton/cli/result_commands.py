@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -76,10 +76,9 @@ def export(
     own = None if parts.model is None else user_model(parts.model)
     recording = exports.load_recording(file, beside=parts.beside, case=parts.case, model=own)
     path = _export_target(file, out, form, kind)
-    write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
     with naming(file), writing(path):
-        write(recording, path, **options)
+        getattr(exports, form.function)(recording, path, **options)
     print_written(path)
     clean = all(one.reached and not one.reason for one in recording.movers)
     if kind == "commonroad" and not clean:
@@ -118,7 +117,14 @@ def plot(file: Path, out: Path | None, *, look: LookOptions, beside: Path | None
     if look.animate and look.html:
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if look.animate else "page" if look.html else "picture"
-    path = _picture_target(file, out, what)
+    endings = ENDINGS[what]
+    path = file.with_suffix(endings[0]) if out is None else out
+    if path.is_dir():
+        path = path / file.with_suffix(endings[0]).name
+    if path.suffix.lower() not in endings:
+        raise InvalidScenario(
+            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+        )
     result: Any
     with errors_at(file):
         found, name = opened(file, Parts(beside=beside)), ""
@@ -159,16 +165,3 @@ def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOpti
         plotting.save_film(plan, path)
     else:
         plotting.player_of_file(document, plan, title=look.title or name or path.stem).save(path)
-
-
-def _picture_target(file: Path, out: Path | None, what: str) -> Path:
-    """Where the picture goes: beside the file, into a folder, or to the file given."""
-    endings = ENDINGS[what]
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
-        )
-    return path

@@ -53,12 +53,8 @@ def table(
         pad_edge=False,
     )
     for k, column in enumerate(columns):
-        made.add_column(
-            column,
-            justify="right" if k in numbers else "left",
-            overflow="fold",
-            no_wrap=k in numbers,
-        )
+        side: Any = "right" if k in numbers else "left"
+        made.add_column(column, justify=side, overflow="fold", no_wrap=k in numbers)
     for row in rows:
         made.add_row(*row)
     return made

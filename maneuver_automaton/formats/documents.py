@@ -11,8 +11,8 @@ import contextlib
 import functools
 import importlib
 import json
+import sys
 from collections.abc import Iterator, Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final, NotRequired, TypeVar, cast
 
@@ -95,15 +95,6 @@ class DocumentHead(TypedDict):
     notes: NotRequired[Annotated[list[str], says("what was left out, and why")]]
     source: NotRequired[SourceEntry]
     interrupted: NotRequired[Annotated[Flag, says("only where a signal came before the end")]]
-
-
-@functools.cache
-def package_version() -> str:
-    """The version of this package; "0" where it is not installed."""
-    try:
-        return metadata.version("maneuver-automaton")
-    except metadata.PackageNotFoundError:
-        return "0"
 
 
 def vehicle_entry(model: Model) -> ModelEntry:
@@ -272,7 +263,8 @@ def _needed(schema: Mapping[str, Any], where: tuple[str | int, ...]) -> str:
 
 def document_of(form: type[T], value: Any, /, **given: Any) -> T:
     """What a file says of a value, by the keys of its kind; see `entry`."""
-    said = entry(form, value, schema=SCHEMA, version=package_version(), **given)
+    version = sys.modules["maneuver_automaton"].__version__
+    said = entry(form, value, schema=SCHEMA, version=version, **given)
     assert isinstance(said, dict)
     return cast("T", {key: said[key] for key in (*HEAD, "notes", *said) if key in said})
 

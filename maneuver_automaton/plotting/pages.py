@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import math
 import textwrap
@@ -17,6 +18,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 from PIL import Image
 
 from maneuver_automaton._files import write_bytes_atomically
@@ -57,6 +59,9 @@ _BLANK: list[Figure] = []
 
 def prepare() -> None:
     """Make axes for the next page with a plane beforehand, which is a fifth of the work on it."""
+    manager: Any = fontManager  # it would look up the font of a text each time it is laid out
+    manager.findfont = functools.cache(manager.findfont)
+    Image.preinit()  # which loads the formats of images
     _BLANK.append(Figure())
     for ax in _BLANK[0].subplots(1, 3):  # most have a plane and two panels
         style.tidy(ax, x="", y="")

@@ -200,14 +200,14 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
         artists |= _steps_of(ax, cast, one)
     else:
         artists |= {"darts": _darts(one, size=size), "bodies": _switch_bodies(one)}
-        poses = _between_ends(one, apart=1e-6 * size)[: None if one.body else 0]
-        artists["switches"] = ax.scatter(
-            poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK],
-            linewidths=0.7, zorder=3.6,
-        )  # fmt: skip
-    for kind in (RING, CLIMB, SINK):
+        if one.body:
+            x, y = _between_ends(one, apart=1e-6 * size)[:, :2].T
+            artists["switches"] = ax.scatter(
+                x, y, s=8.0, facecolors="white", edgecolors=[INK], linewidths=0.7, zorder=3.6
+            )
+    for kind in sorted({_symbol(piece) for piece in still}, key=(RING, CLIMB, SINK).index):
         some = [piece for piece in still if _symbol(piece) == kind]
-        at = np.array([piece.pose[0, :2] for piece in some]).reshape(-1, 2)
+        at = np.array([piece.pose[0, :2] for piece in some])
         artists[f"still {kind}"] = ax.scatter(
             at[:, 0], at[:, 1], s=150.0, marker=kind, facecolors="none",
             edgecolors=[colors[piece.name] for piece in some], linewidths=1.8, zorder=4.5,

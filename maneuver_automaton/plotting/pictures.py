@@ -298,15 +298,10 @@ def heading_of(recording: Recording, look: Look) -> list[str]:
     lines += [textwrap.shorten(text, TEXT_WIDTH, placeholder=" …") for text in broken[:MOST_BROKEN]]
     if (more := len(broken) - MOST_BROKEN) > 0:
         lines.append(f"and {more} more guarantee{'s' if more > 1 else ''} broken")
-    return lines + _reasons(recording)
-
-
-def _reasons(recording: Recording) -> list[str]:
-    """Why some do not arrive: a line for each reason, with the names that it holds for."""
-    named: dict[str, list[str]] = {}
+    named: dict[str, list[str]] = {}  # why some do not arrive: whom each reason holds for
     for one in recording.movers:
         if one.name and not (one.has_plan and one.reached):
             named.setdefault(one.reason or "no plan", []).append(one.name)
-    lines = [f"{few(names)}: {reason}" for reason, names in named.items()]
-    more = len(lines) - MOST_REASONS
-    return lines if more <= 0 else [*lines[:MOST_REASONS], f"and {more} more reasons"]
+    lines += [f"{few(names)}: {reason}" for reason, names in list(named.items())[:MOST_REASONS]]
+    more = len(named) - MOST_REASONS
+    return lines if more <= 0 else [*lines, f"and {more} more reasons"]

@@ -56,16 +56,18 @@ class Need:
 
     def __init__(self, text: str) -> None:
         self.text = text
+        self.schema: CoreSchema | None = None  # the same wherever the type is, and made once
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        return core_schema.custom_error_schema(
+        self.schema = self.schema or core_schema.custom_error_schema(
             handler(source),
             custom_error_type="need",
             custom_error_message="need {need}",
             custom_error_context={"need": self.text},
         )
+        return self.schema
 
 
 class Several:

@@ -4,11 +4,9 @@ Checked here is what a key may hold by itself; what fits together is checked whe
 are made of it (`problem.py`, `costs.py`, `automaton/`).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from annotated_types import Ge
 from pydantic import (
@@ -202,7 +200,7 @@ class ViaPart(FilePart, title="Via"):
     gate: Gate | None = optional("[[x, y], [x, y]]: a segment that is crossed anywhere")
 
     @model_validator(mode="after")
-    def _somewhere(self) -> ViaPart:
+    def _somewhere(self) -> Self:
         if self.pose is None and self.gate is None:
             raise refusal("got neither pose nor gate, need one of them")
         if self.pose is not None and len(self.pose) == 2 and not self.free_heading:
