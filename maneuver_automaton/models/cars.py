@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 
@@ -46,12 +46,6 @@ class Car(Vehicle):
     max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "car"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
-
-    def __post_init__(self) -> None:
-        plain_numbers(self)
-        if not 0.0 < self.wheelbase < math.inf:
-            raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
-        check_parameters(self)
 
     @property
     def turning_radius(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton._limits import SMALLEST
 from maneuver_automaton.groups import SE2, LieGroup
 
 Components = Sequence[Any] | Array
@@ -133,8 +134,9 @@ def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
     values = {one.name: getattr(vehicle, one.name) for one in fields(vehicle)}
     for one, value in values.items():
         unsigned = one in (*but, AT_REST) or one.startswith("min_")
-        if value is not None and not unsigned and not 0.0 < value < math.inf:
-            raise ValueError(f"{name}: {one} must be positive, got {value}")
+        if value is not None and not unsigned and not SMALLEST <= value < math.inf:
+            need = f", need at least {SMALLEST:g}" if 0.0 < value < SMALLEST else ""
+            raise ValueError(f"{name}: {one} must be positive, got {value}{need}")
     for one in ("max_steering", "max_articulation", "max_tilt"):
         if (angle := values.get(one)) is not None and not angle < math.pi / 2:
             raise ValueError(f"{name}: {one} must be less than pi / 2, got {angle} rad")
