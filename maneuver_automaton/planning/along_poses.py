@@ -580,6 +580,7 @@ class _Search:
         begin = "the start" if last == GOAL else f"pose {last + 1} on the way"
         end = "the goal" if k == GOAL else f"pose {k + 1} on the way"
         sole = all(self.ways[i].is_sole for i in (last, k) if i != GOAL) and self.in_order
+        sole &= last == GOAL or not self.legs.is_timed  # what was driven before may be another
         status = result.status if sole else PlanStatus.NO_PLAN
         if any(one.status is PlanStatus.OUT_OF_BUDGET for one in self.failed.values()):
             status = PlanStatus.OUT_OF_BUDGET
