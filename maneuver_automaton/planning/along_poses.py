@@ -27,6 +27,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.arrivals import (
     VALLEYS,
     Arrival,
@@ -176,7 +177,8 @@ class _Legs:
         goals = self.between.goals if to is None else (Goal(to.pose, trim=to.trim),)
         horizon, plan = base.horizon, chain.plan
         if horizon.max_time is not None:
-            horizon = replace(horizon, max_time=max(horizon.max_time - plan.duration, LEAST_TIME))
+            spent = plan.duration + (self._after(chain, to) if to else 0.0)
+            horizon = replace(horizon, max_time=max(horizon.max_time - spent, LEAST_TIME))
         if horizon.max_trims is not None and plan.trims:
             left = horizon.max_trims - int((plan.durations > 0.0).sum()) + 1  # of equal ones one
             horizon = replace(horizon, max_trims=max(left, 1))
@@ -189,6 +191,16 @@ class _Legs:
         )
         state = self.between.start_state if here is None else None
         return leg if state is None else replace(leg, start_trim=None, start_state=state)
+
+    def _after(self, chain: Chain, to: Arrival) -> float:
+        """Least time [s] that a plan needs beyond an arrival, which its leg there must leave."""
+        problem, timed = self.found.problem, replace(self.middle, cost=Cost(time=1.0))
+        ahead = problem.via[len(chain.passed) + 1 :] if problem.order == "given" else ()
+        way = [Goal(to.pose), *map(goal_around, ahead)]
+        between = math.fsum(set_bound(timed, *pair) for pair in itertools.pairwise(way))
+        stays = math.fsum(one.stay_s for one in problem.via)
+        stays -= math.fsum(problem.via[k].stay_s for k in chain.passed)
+        return between + min(set_bound(timed, way[-1], goal) for goal in problem.goals) + stays
 
     def planned(
         self, chain: Chain, to: Arrival | None, budget: Budget, *, more: bool = False
