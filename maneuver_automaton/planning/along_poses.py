@@ -195,12 +195,11 @@ class _Legs:
     def _after(self, chain: Chain, to: Arrival) -> float:
         """Least time [s] that a plan needs beyond an arrival, which its leg there must leave."""
         problem, timed = self.found.problem, replace(self.middle, cost=Cost(time=1.0))
-        ahead = problem.via[len(chain.passed) + 1 :] if problem.order == "given" else ()
-        way = [Goal(to.pose), *map(goal_around, ahead)]
-        between = math.fsum(set_bound(timed, *pair) for pair in itertools.pairwise(way))
-        stays = math.fsum(one.stay_s for one in problem.via)
-        stays -= math.fsum(problem.via[k].stay_s for k in chain.passed)
-        return between + min(set_bound(timed, way[-1], goal) for goal in problem.goals) + stays
+        left = [one for k, one in enumerate(problem.via) if k not in chain.passed]  # and this one
+        way = [Goal(to.pose), *map(goal_around, left[1:] if problem.order == "given" else ())]
+        legs = [set_bound(timed, *pair) for pair in itertools.pairwise(way)]
+        last = min(set_bound(timed, way[-1], goal) for goal in problem.goals)
+        return math.fsum([*legs, last, *(one.stay_s for one in left)])
 
     def planned(
         self, chain: Chain, to: Arrival | None, budget: Budget, *, more: bool = False
@@ -409,24 +408,13 @@ class _Search:
     def _with_leg(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> Chain:
         assert result.plan is not None
         plan = _joined(chain.plan, result.plan)
-        if to is None:
-            return replace(
-                chain,
-                plan=plan,
-                cost=self.legs.between.cost_of(plan),
-                legs=(*chain.legs, result),
-                goal_index=result.goal_index,
-            )
-        stay = self.ways[k].via.stay_s
-        if stay:
+        if to is not None and (stay := self.ways[k].via.stay_s):
             plan = _joined(plan, self._standing(plan, stay))
-        return Chain(
-            plan,
-            self.legs.between.cost_of(plan),
-            (*chain.passed, k),
-            (*chain.arrivals, to),
-            (*chain.legs, result),
-        )
+        cost, legs = self.legs.between.cost_of(plan), (*chain.legs, result)
+        chain = replace(chain, plan=plan, cost=cost, legs=legs)
+        if to is None:
+            return replace(chain, goal_index=result.goal_index)
+        return replace(chain, passed=(*chain.passed, k), arrivals=(*chain.arrivals, to))
 
     def _standing(self, plan: Plan, seconds: float) -> Plan:
         """A plan that stands where another one ends."""
