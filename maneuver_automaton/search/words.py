@@ -100,8 +100,7 @@ def search_words(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
     job.idle.append(job)
-    # No words of more moving trims are admitted, and none is left out.
-    exhaustive = finished and most <= longest and not _may_fold(problem, setup)
+    exhaustive = finished and most <= longest and not _may_fold(problem, setup)  # no word is missed
     none = SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET
     return SearchResult(
         status=SearchStatus.FOUND if solutions else none,
@@ -113,11 +112,8 @@ def search_words(
 
 
 def _may_fold(problem: Problem, setup: SearchSetup) -> bool:
-    """Whether straights before and after a turn to the goal are parallel, and time is limited.
-
-    Of the words that drive along one line twice, as in a U-turn, steering knows the one of least
-    times, and not the one that meets the time. Along the line there and back, less costs less.
-    """
+    """Whether words may drive along one line twice, as in a U-turn, and time is limited."""
+    # Steering knows the one of least times alone. There and back, less costs less, too.
     turn = math.remainder(float(setup.goal[2]), 2.0 * math.pi)
     horizon, twists = problem.horizon, setup.library.twists
     if not (horizon.time or horizon.max_time) or setup.free_heading or abs(turn) < PARALLEL:
