@@ -1,4 +1,4 @@
-"""Upper limits of numbers that are planned with: no vehicle is so far away, so large or so fast.
+"""Limits of numbers that are planned with: no vehicle is so far away, so large, so fast or slow.
 
 Coordinates may be counted from far away: published parking cases lie 7e9 m from their origin.
 Beyond these limits numbers have no digits left for a body's size, fields and swept solids have no
@@ -20,6 +20,7 @@ MOST_HEADING = 1e6  # [rad] of a pose, which has no digits left for a millimetre
 MOST_TURNS = 200  # whole turns within a fixed time, of which plans may have any number
 LARGEST_BODY = 1e7  # [m] from a vehicle's pose to any point of its body
 STEEPEST_STEERING = 1.5  # [rad] of a wheel; at a right angle nothing rolls
+SMALLEST = 1e-100  # of a vehicle's parameter and of a trim's twist: what divides by less is inf
 LONGEST_STROKE = 1e4  # [m, rad] of one maneuver from rest to rest, which is sampled all along
 
 

@@ -72,6 +72,8 @@ def test_a_trim_that_nothing_drives_is_refused():
         Trim(name="on", body_velocity=[1e7, 0.0, 0.0], control=[1e7, 0.0])
     with pytest.raises(ValueError, match="turns at 1e\\+09 rad/s, need at most 1000 rad/s"):
         Trim(name="on", body_velocity=[0.0, 0.0, -1e9], control=[1e9])
+    with pytest.raises(ValueError, match="'on': its twist holds 1e-120, need 0 or at least 1e-100"):
+        Automaton.of_controls(Unicycle(), {"on": (1.0, -1e-120)})
 
 
 def test_a_body_far_from_its_pose_is_refused():

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Drawn
+from maneuver_automaton._limits import SMALLEST
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
 from maneuver_automaton.models.model import check_model
@@ -85,6 +86,12 @@ class Automaton(Drawn):
                     f"trim {trim.name!r}: got reduced state {trim.reduced_state.shape}, need "
                     f"({n_states},) for the {self.model.name}"
                 )
+        sizes = np.abs(self.body_velocities)
+        for k, axis in np.argwhere((sizes > 0.0) & (sizes < SMALLEST)).tolist():
+            raise InvalidAutomaton(
+                f"trim {self.trim_names[k]!r}: its twist holds {sizes[k, axis]:g}, need 0 or at "
+                f"least {SMALLEST:g} in size"
+            )
         for maneuver in self.maneuvers:
             _check_fit(maneuver, self[maneuver.source], self[maneuver.target])
         if math.isfinite(lateral_limit(self.model)):

@@ -422,12 +422,12 @@ class _FleetSearch:
 
     def _last_at_least(self) -> float:
         """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""
-        times = [0.0]
-        for one in self.vehicles:
+        times = [one.problem.start_time for one in self.vehicles]
+        for k, one in enumerate(self.vehicles):
             cost = terms_of(one.problem.cost)
             timed = cost and cost.time > 0.0 and cost == Cost(time=cost.time)
             if one.bound is not None and cost and timed:
-                times.append(one.problem.start_time + one.bound.value / cost.time)
+                times[k] += one.bound.value / cost.time
         return max(times)
 
     def _result(self) -> FleetResult:

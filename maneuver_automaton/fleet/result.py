@@ -101,7 +101,8 @@ class FleetResult(Played):
         """Share of the objective that is at most to be saved; None if someone has no plan."""
         if self.status is not FleetStatus.FOUND:
             return None
-        return max(0.0, 1.0 - self.lower_bound / self.value) if self.value > 0.0 else 0.0
+        share = 1.0 - self.lower_bound / self.value if self.value else 0.0
+        return max(0.0, share if self.value > 0.0 else -share)  # a clock may begin before 0
 
 
 class FleetGuarantee(enum.Enum):

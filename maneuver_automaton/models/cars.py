@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, check_fields, plain_numbers
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 
@@ -46,11 +46,6 @@ class Car(Vehicle):
     max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "car"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
-
-    def __post_init__(self) -> None:
-        plain_numbers(self)
-        check_fields("car", self, "wheelbase", unit="m")
-        check_parameters(self)
 
     @property
     def turning_radius(self) -> float:

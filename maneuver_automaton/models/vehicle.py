@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, check_range, plain_numbers
+from maneuver_automaton._limits import SMALLEST
 from maneuver_automaton.groups import SE2, LieGroup
 
 Components = Sequence[Any] | Array
@@ -135,6 +136,7 @@ def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
         unsigned = one in (*but, AT_REST) or one.startswith("min_")
         if not unsigned:
             check_range(f"{name}: {one}", value)
+            check_range(f"{name}: {one}", value, least=SMALLEST)
     for one in ("max_steering", "max_articulation", "max_tilt"):
         if (angle := values.get(one)) is not None and not angle < math.pi / 2:
             raise ValueError(f"{name}: {one} must be less than pi / 2, got {angle} rad")

@@ -27,6 +27,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.arrivals import (
     VALLEYS,
     Arrival,
@@ -176,7 +177,8 @@ class _Legs:
         goals = self.between.goals if to is None else (Goal(to.pose, trim=to.trim),)
         horizon, plan = base.horizon, chain.plan
         if horizon.max_time is not None:
-            horizon = replace(horizon, max_time=max(horizon.max_time - plan.duration, LEAST_TIME))
+            spent = plan.duration + (self._after(chain, to) if to else 0.0)
+            horizon = replace(horizon, max_time=max(horizon.max_time - spent, LEAST_TIME))
         if horizon.max_trims is not None and plan.trims:
             left = horizon.max_trims - int((plan.durations > 0.0).sum()) + 1  # of equal ones one
             horizon = replace(horizon, max_trims=max(left, 1))
@@ -189,6 +191,15 @@ class _Legs:
         )
         state = self.between.start_state if here is None else None
         return leg if state is None else replace(leg, start_trim=None, start_state=state)
+
+    def _after(self, chain: Chain, to: Arrival) -> float:
+        """Least time [s] that a plan needs beyond an arrival, which its leg there must leave."""
+        problem, timed = self.found.problem, replace(self.middle, cost=Cost(time=1.0))
+        left = [one for k, one in enumerate(problem.via) if k not in chain.passed]  # and this one
+        way = [Goal(to.pose), *map(goal_around, left[1:] if problem.order == "given" else ())]
+        legs = [set_bound(timed, *pair) for pair in itertools.pairwise(way)]
+        last = min(set_bound(timed, way[-1], goal) for goal in problem.goals)
+        return math.fsum([*legs, last, *(one.stay_s for one in left)])
 
     def planned(
         self, chain: Chain, to: Arrival | None, budget: Budget, *, more: bool = False
@@ -397,24 +408,13 @@ class _Search:
     def _with_leg(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> Chain:
         assert result.plan is not None
         plan = _joined(chain.plan, result.plan)
-        if to is None:
-            return replace(
-                chain,
-                plan=plan,
-                cost=self.legs.between.cost_of(plan),
-                legs=(*chain.legs, result),
-                goal_index=result.goal_index,
-            )
-        stay = self.ways[k].via.stay_s
-        if stay:
+        if to is not None and (stay := self.ways[k].via.stay_s):
             plan = _joined(plan, self._standing(plan, stay))
-        return Chain(
-            plan,
-            self.legs.between.cost_of(plan),
-            (*chain.passed, k),
-            (*chain.arrivals, to),
-            (*chain.legs, result),
-        )
+        cost, legs = self.legs.between.cost_of(plan), (*chain.legs, result)
+        chain = replace(chain, plan=plan, cost=cost, legs=legs)
+        if to is None:
+            return replace(chain, goal_index=result.goal_index)
+        return replace(chain, passed=(*chain.passed, k), arrivals=(*chain.arrivals, to))
 
     def _standing(self, plan: Plan, seconds: float) -> Plan:
         """A plan that stands where another one ends."""
@@ -580,6 +580,7 @@ class _Search:
         begin = "the start" if last == GOAL else f"pose {last + 1} on the way"
         end = "the goal" if k == GOAL else f"pose {k + 1} on the way"
         sole = all(self.ways[i].is_sole for i in (last, k) if i != GOAL) and self.in_order
+        sole &= last == GOAL or not self.legs.is_timed  # what was driven before may be another
         status = result.status if sole else PlanStatus.NO_PLAN
         if any(one.status is PlanStatus.OUT_OF_BUDGET for one in self.failed.values()):
             status = PlanStatus.OUT_OF_BUDGET

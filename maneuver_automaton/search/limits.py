@@ -54,7 +54,7 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
         distance = _distance_to(setup.goal, goal)
         speed = float(np.linalg.norm(setup.library.twists[:, [0, 1, 3]], axis=1).max())
         turning = float(np.abs(setup.library.twists[:, 2]).max())
-        least = max(distance / speed if distance else 0.0, turn / turning if turn else 0.0)
+        least = max(distance / speed if speed else 0.0, turn / turning if turning else 0.0)
         if least > limit * (1.0 + 1e-9):
             return (
                 f"the goal cannot be reached in {limit:g} s: "

@@ -142,10 +142,14 @@ def test_improvements_only_improve():
     assert result.cost == pytest.approx(values[-1])
 
 
-def test_the_last_arrival_may_be_what_counts():
-    result = plan_fleet(fleets.swap(3), objective="last", time_limit=10.0, max_rounds=5)
+@pytest.mark.parametrize("begin", [0.0, -100.0])
+def test_the_last_arrival_may_be_what_counts(begin):
+    fleet = fleets.swap(3)
+    fleet = replace(fleet, problems=[replace(one, start_time=begin) for one in fleet.problems])
+    result = plan_fleet(fleet, objective="last", time_limit=10.0, max_rounds=5)
     assert result.value == result.last_s
-    assert result.lower_bound <= result.last_s
+    assert begin < result.lower_bound <= result.last_s
+    assert result.lower_bound == result.last_s or result.gap > 0.0
 
 
 @pytest.mark.parametrize(

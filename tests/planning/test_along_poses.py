@@ -167,6 +167,21 @@ def test_past_a_wide_gate_the_bound_is_no_lower_than_without_it():
         assert result.lower_bound == pytest.approx(10.5) == result.cost
 
 
+def test_a_leg_leaves_the_time_that_what_follows_needs_and_proves_nothing_for_others():
+    controls = {"slow": (0.5, 0, 0), "fast": (2, 0, 0), "up": (0, 2, 0), "down": (0, -2, 0)}
+    robot = ma.Automaton.of_controls(ma.Omnidirectional(), controls)
+    problem = ma.Problem(robot, START, [4, 0, 0], via=[2.0, 0.0, 0.0], cost=ma.Cost(effort=1.0),
+                         horizon=ma.Horizon(max_time=3.0))  # fmt: skip
+    assert planned(problem).cost == pytest.approx(7.0)  # 4 / 3 s slow, 5 / 3 s fast
+    # Round a wall the rest takes longer than the straight way for which the first leg leaves time.
+    wall = {"obstacles": ma.Box([0.2, 4.0], [4.0, 0.0]), "footprint": ma.Disc(0.05)}
+    problem = replace(problem, goals=[6.0, 0.0, 0.0], horizon=ma.Horizon(max_time=5.3), **wall)
+    word = [robot[name] for name in ("fast", "up", "fast", "down")]
+    assert ma.verify(problem, ma.Plan(START, word, durations=[1.0, 1.1, 2.0, 1.1])).passed
+    result = ma.plan(problem, time_limit=600.0)
+    assert result.status is not ma.PlanStatus.UNREACHABLE, result.reason
+
+
 def test_a_gate_is_crossed_and_a_stop_lasts():
     via = [ma.Via(gate=[[3, -1], [3, 2]]), ma.Via([6, 0, 0], stay_s=2.0)]
     result = planned(ma.Problem(ROBOT, START, [9, 0, 0], via=via))

@@ -106,6 +106,20 @@ def test_a_goal_straight_ahead_behind_a_wall_is_not_called_off_the_curve():
 
 
 AHEAD, LEFT, RIGHT = (1, 0, 0, 0), (2, 0, 1, 0), (1, 0, -0.5, 0)
+
+
+@pytest.mark.parametrize(
+    ("twists", "goal"),
+    [
+        ([(0, 0, 1, 0), (0, 0, -1, 0)], Goal([1, 0, 0.3, 0], tolerance_m=0.1)),
+        ([AHEAD, (0, 1, 0, 0)], Goal([1, 1, 1e-10, 0])),
+    ],
+)
+def test_what_does_not_drive_or_does_not_turn_has_no_least_time_for_it(twists, goal):
+    problem = Problem(library(*twists), np.zeros(4), goal, horizon=Horizon(max_time=9.0))
+    assert why_impossible(problem) == ""
+
+
 LENGTH = Cost(length=1.0)
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import UserModel
+from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.words import search_words
@@ -406,3 +408,14 @@ def test_start_equal_to_goal():
     assert free.cost == 0.0
     whole_turn = replace(parking(time=None), start=np.array([0.0, 0.0, -4.0 * np.pi]))
     assert best(whole_turn).trims.size == 0
+
+
+@pytest.mark.parametrize("most", [3, 4])
+def test_of_a_u_turn_in_a_fixed_time_nothing_is_proven(most):
+    robot = Automaton.of_controls(Unicycle(), {"on": (1, 0), "left": (1, 1), "right": (1, -1)})
+    known = Plan(np.zeros(3), [robot[n] for n in ("on", "left", "on")], durations=[2, math.pi, 1])
+    horizon = Horizon(time=known.duration, max_trims=most)
+    problem = Problem(robot, np.zeros(3), known.end, horizon=horizon, cost=Cost(effort=1.0))
+    found = search_words(problem, problem.goals[0])
+    assert not found.solutions or found.solutions[0].cost > problem.cost_of(known)
+    assert not found.exhaustive
