@@ -112,6 +112,8 @@ def test_ground_costs_the_way_on_it():
     )
     by_time = problem(Ground(LAWN, 5.0, per="second"))
     assert by_time.cost_of(one) == pytest.approx(here.cost_of(one), rel=1e-3)  # at 1 m/s
+    at_once = plan(replace(by_time, start=[4.0, 0.0, 0.0], goals=[4.0, 0.0, 0.0]), time_limit=60.0)
+    assert (at_once.cost, at_once.audit.place_price) == (0.0, 0.0)
 
 
 def test_rasters_hills_and_costmaps():

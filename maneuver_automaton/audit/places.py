@@ -42,7 +42,8 @@ def price_again(
 
     By two rules on each stretch, which is halved where they differ.
     """
-    lasting = np.diff(drive.frames.times)
+    # Without a piece it stands for the time of the plan, which may be none.
+    lasting = np.diff(drive.frames.times) if drive.pieces.size else np.full(1, drive.plan.duration)
 
     def rates(spans: Spans) -> Array:
         shares = (spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES).ravel()
@@ -69,8 +70,6 @@ def price_again(
             found[paid] *= np.sqrt(planar + (twists[:, 3:] ** 2).sum(axis=1))
         return found.reshape(-1, SHARES.size)
 
-    if not lasting.size:
-        return 0.0
     spans = evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
     done = 0.0
     for _ in range(MOST_ROUNDS):
