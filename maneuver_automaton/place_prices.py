@@ -20,6 +20,7 @@ from maneuver_automaton.places import (
     rates_along,
     scale_of,
     smoothed,
+    unseen,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
@@ -90,10 +91,11 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
         fine = spans * (rates @ FINE)
         off = sure * np.abs(fine - spans * (rates @ COARSE))
         most = SHARE * (beside + done + float(fine.sum()))
-        if doubt + off.sum() <= most or len(off) > MOST_INTERVALS:
+        hides = motion.unseen(todo) > most
+        if (doubt + off.sum() <= most and not hides.any()) or len(off) > MOST_INTERVALS:
             done, doubt = done + float(fine.sum()), doubt + float(off.sum())
             break
-        split = off > 0.25 * most / len(off)
+        split = hides | (off > 0.25 * most / len(off))
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
         todo, whole = todo.halved(split), rates[split]
@@ -183,6 +185,12 @@ class _Motion:
         )
         rates = rates_along(self.cost, poses, twists, states)
         return rates * self._paces(twists), allowed(self.cost, poses, twists)
+
+    def unseen(self, stretches: _Intervals) -> Array:
+        """What each may cost (n,) that its nodes do not see: where an area begins and ends."""
+        spans = stretches.end - stretches.begin
+        poses, twists, _ = self.steps(stretches.piece, stretches.begin + 0.5 * spans)
+        return unseen(self.cost, poses, _speeds(twists) * spans, spans)
 
     def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
         """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""

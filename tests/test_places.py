@@ -116,6 +116,15 @@ def test_ground_costs_the_way_on_it():
     assert (at_once.cost, at_once.audit.place_price) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize("x", [5.0, 9.1])
+def test_the_corner_of_an_area_counts_however_small(x):
+    straight = Plan([0, 0, 0], [CAR["+1 +0.0"]], durations=[18.0])
+    corner = Polygon([[x, 0.02], [x + 3.0, -2.98], [x - 3.0, -2.98]])  # 4 cm of it are driven on
+    here = problem(Ground(corner, price=20.0), goal=[18, 0, 0], obstacles=())
+    assert here.place_prices_of(straight)[0].price == pytest.approx(0.8, abs=5e-3)
+    assert verify(here, straight).audit.place_price == pytest.approx(0.8, abs=5e-3)
+
+
 def test_rasters_hills_and_costmaps():
     values = np.random.default_rng(0).uniform(0.0, 2.0, (16, 44))
     at = {"resolution": 0.5, "origin": [-2.0, -4.0, 0.0]}

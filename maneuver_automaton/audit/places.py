@@ -14,7 +14,7 @@ from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.passages import AuditedBody
-from maneuver_automaton.places import Clearance, PlaceCost, rates_along
+from maneuver_automaton.places import Clearance, PlaceCost, rates_along, unseen
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
@@ -77,9 +77,12 @@ def price_again(
         seconds = lasting[spans.element] * (spans.end - spans.begin)
         fine = values @ KRONROD * seconds
         off = np.abs(fine - values @ LOBATTO * seconds)
-        if off.sum() <= CLOSE * whole:
+        middles = drive.frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + offset
+        ways = seconds * drive.frames.speed[spans.element]
+        hides = unseen(cost, middles, ways, seconds) > CLOSE * whole
+        if off.sum() <= CLOSE * whole and not hides.any():
             return done + float(fine.sum())
-        again = off > 0.25 * CLOSE * whole / len(off)
+        again = hides | (off > 0.25 * CLOSE * whole / len(off))
         done += float(fine[~again].sum())
         rest, fine = spans.of(again), fine[again]
         middle = 0.5 * (rest.begin + rest.end)
