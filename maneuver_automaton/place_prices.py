@@ -14,13 +14,13 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups.se2 import after, displacements
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import (
+    Ground,
     PlaceCost,
     allowed,
     gradient_of,
     rates_along,
     scale_of,
     smoothed,
-    unseen,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
@@ -186,11 +186,13 @@ class _Motion:
         rates = rates_along(self.cost, poses, twists, states)
         return rates * self._paces(twists), allowed(self.cost, poses, twists)
 
-    def unseen(self, stretches: _Intervals) -> Array:
+    def unseen(self, of: _Intervals) -> Array:
         """What each may cost (n,) that its nodes do not see: where an area begins and ends."""
-        spans = stretches.end - stretches.begin
-        poses, twists, _ = self.steps(stretches.piece, stretches.begin + 0.5 * spans)
-        return unseen(self.cost, poses, _speeds(twists) * spans, spans)
+        if not isinstance(self.cost, Ground):
+            return np.zeros(len(of.piece))
+        spans = of.end - of.begin
+        poses, twists, _ = self.steps(of.piece, of.begin + 0.5 * spans)
+        return self.cost.unseen(poses[:, :2], _speeds(twists) * spans, spans)
 
     def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
         """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""
@@ -240,10 +242,7 @@ class _Motion:
 
 def _speeds(twists: Array) -> Array:
     """Speeds (...,) of velocities (..., dof), whatever they turn by."""
-    planar = twists[..., 0] ** 2 + twists[..., 1] ** 2
-    if twists.shape[-1] > 3:
-        planar += (twists[..., 3:] ** 2).sum(axis=-1)
-    return np.asarray(np.sqrt(planar))
+    return np.asarray(np.sqrt((np.delete(twists, 2, axis=-1) ** 2).sum(axis=-1)))
 
 
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:

@@ -416,9 +416,10 @@ class Ground:
         share = np.clip(0.5 + self._inwards(places) / self.edge, 0.0, 1.0)
         return np.asarray(share * share * (3.0 - 2.0 * share))
 
-    def unseen(self, places: Array, ways: Array) -> NDArray[np.bool_]:
-        """Whether an area may begin or end within half of ways (n,) [m] about places (n, 2)."""
-        return np.abs(self._inwards(places)) <= 0.5 * ways
+    def unseen(self, places: Array, ways: Array, lasting: Array) -> Array:
+        """What an area may cost (n,) between two looks of four at stretches about places [m, s]."""
+        near = np.abs(self._inwards(places)) <= 0.5 * ways
+        return near * (0.25 * self.price) * (ways if self.per == "metre" else lasting)
 
     def _inwards(self, places: Array) -> Array:
         """Distances (...,) [m] to the border of the areas, negative outside; -inf without areas."""
@@ -611,18 +612,6 @@ def rates_along(
     if (least := rates.min(initial=0.0)) < 0.0:
         raise ValueError(f"place cost {type(cost).__name__}: rates: got {least:g}, need at least 0")
     return rates
-
-
-def unseen(cost: PlaceCost, poses: Array, ways: Array, lasting: Array) -> Array:
-    """What a jump of the rate may hide (n,) between two looks of four at stretches about poses.
-
-    They are `ways` (n,) [m] long and `lasting` (n,) [s]; 0 where it does not jump or does not say.
-    """
-    own: Callable[[Array, Array], NDArray[np.bool_]] | None = getattr(cost, "unseen", None)
-    if own is None:
-        return np.zeros(len(ways))
-    jump: float = getattr(cost, "price", 0.0)
-    return own(poses[:, :2], ways) * (0.25 * jump) * (ways if cost.per == "metre" else lasting)
 
 
 def gradient_of(

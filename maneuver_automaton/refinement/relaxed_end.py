@@ -238,13 +238,11 @@ def _independent(jacobian: Array) -> IntArray:
 
 def _closed(task: _Relaxation, times: Array) -> Array | None:
     """Times near `times` that meet all constraints but for rounding; None where none are found."""
-    used = times > 0.0
-    used[: task.first] = False
+    used = (times > 0.0) & (np.arange(times.size) >= task.first)
     for _ in range(CLOSING_STEPS):
         (values, jacobian), (room, slopes) = task.exact(times), task.room(times)
         beyond = room < -INSIDE
-        values = np.append(values, room[beyond])
-        jacobian = np.concatenate([jacobian, slopes[beyond]])
+        values, jacobian = np.append(values, room[beyond]), np.vstack([jacobian, slopes[beyond]])
         if not values.size or not used.any():
             break
         times = times.copy()
