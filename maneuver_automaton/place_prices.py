@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups.se2 import after, displacements
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import (
+    Ground,
     PlaceCost,
     allowed,
     gradient_of,
@@ -90,10 +91,11 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
         fine = spans * (rates @ FINE)
         off = sure * np.abs(fine - spans * (rates @ COARSE))
         most = SHARE * (beside + done + float(fine.sum()))
-        if doubt + off.sum() <= most or len(off) > MOST_INTERVALS:
+        hides = motion.unseen(todo) > most
+        if (doubt + off.sum() <= most and not hides.any()) or len(off) > MOST_INTERVALS:
             done, doubt = done + float(fine.sum()), doubt + float(off.sum())
             break
-        split = off > 0.25 * most / len(off)
+        split = hides | (off > 0.25 * most / len(off))
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
         todo, whole = todo.halved(split), rates[split]
@@ -184,6 +186,14 @@ class _Motion:
         rates = rates_along(self.cost, poses, twists, states)
         return rates * self._paces(twists), allowed(self.cost, poses, twists)
 
+    def unseen(self, of: _Intervals) -> Array:
+        """What each may cost (n,) that its nodes do not see: where an area begins and ends."""
+        if not isinstance(self.cost, Ground):
+            return np.zeros(len(of.piece))
+        spans = of.end - of.begin
+        poses, twists, _ = self.steps(of.piece, of.begin + 0.5 * spans)
+        return self.cost.unseen(poses[:, :2], _speeds(twists) * spans, spans)
+
     def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
         """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""
         paces = self._paces(twists)
@@ -232,10 +242,7 @@ class _Motion:
 
 def _speeds(twists: Array) -> Array:
     """Speeds (...,) of velocities (..., dof), whatever they turn by."""
-    planar = twists[..., 0] ** 2 + twists[..., 1] ** 2
-    if twists.shape[-1] > 3:
-        planar += (twists[..., 3:] ** 2).sum(axis=-1)
-    return np.asarray(np.sqrt(planar))
+    return np.asarray(np.sqrt((np.delete(twists, 2, axis=-1) ** 2).sum(axis=-1)))
 
 
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:

@@ -420,6 +420,16 @@ class Ground:
 
     def _depths(self, places: Array) -> Array:
         """From 0 half an edge outside of all areas to 1 as far inside of one, without a kink."""
+        share = np.clip(0.5 + self._inwards(places) / self.edge, 0.0, 1.0)
+        return np.asarray(share * share * (3.0 - 2.0 * share))
+
+    def unseen(self, places: Array, ways: Array, lasting: Array) -> Array:
+        """What an area may cost (n,) between two looks of four at stretches about places [m, s]."""
+        near = np.abs(self._inwards(places)) <= 0.5 * ways
+        return near * (0.25 * self.price) * (ways if self.per == "metre" else lasting)
+
+    def _inwards(self, places: Array) -> Array:
+        """Distances (...,) [m] to the border of the areas, negative outside; -inf without areas."""
         parts, points = parts_of(self.areas), shapely.points(places)
         depth = np.full(places.shape[:-1], -math.inf)
         for disc in parts:
@@ -430,8 +440,7 @@ class Ground:
             whole = shapely.union_all(solid)
             away = shapely.distance(whole.boundary, points)
             depth = np.maximum(depth, np.where(shapely.intersects(whole, points), away, -away))
-        share = np.clip(0.5 + depth / self.edge, 0.0, 1.0)
-        return np.asarray(share * share * (3.0 - 2.0 * share))
+        return depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -112,6 +112,17 @@ def test_ground_costs_the_way_on_it():
     )
     by_time = problem(Ground(LAWN, 5.0, per="second"))
     assert by_time.cost_of(one) == pytest.approx(here.cost_of(one), rel=1e-3)  # at 1 m/s
+    at_once = plan(replace(by_time, start=[4.0, 0.0, 0.0], goals=[4.0, 0.0, 0.0]), time_limit=60.0)
+    assert (at_once.cost, at_once.audit.place_price) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("x", [5.0, 9.1])
+def test_the_corner_of_an_area_counts_however_small(x):
+    straight = Plan([0, 0, 0], [CAR["+1 +0.0"]], durations=[18.0])
+    corner = Polygon([[x, 0.02], [x + 3.0, -2.98], [x - 3.0, -2.98]])  # 4 cm of it are driven on
+    here = problem(Ground(corner, price=20.0), goal=[18, 0, 0], obstacles=())
+    assert here.place_prices_of(straight)[0].price == pytest.approx(0.8, abs=5e-3)
+    assert verify(here, straight).audit.place_price == pytest.approx(0.8, abs=5e-3)
 
 
 def test_rasters_hills_and_costmaps():

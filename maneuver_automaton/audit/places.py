@@ -14,7 +14,7 @@ from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.passages import AuditedBody
-from maneuver_automaton.places import Clearance, PlaceCost, rates_along
+from maneuver_automaton.places import Clearance, Ground, PlaceCost, rates_along
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
@@ -42,7 +42,8 @@ def price_again(
 
     By two rules on each stretch, which is halved where they differ.
     """
-    lasting = np.diff(drive.frames.times)
+    # Without a piece it stands for the time of the plan, which may be none.
+    lasting = np.diff(drive.frames.times) if drive.pieces.size else np.full(1, drive.plan.duration)
 
     def rates(spans: Spans) -> Array:
         shares = (spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES).ravel()
@@ -65,12 +66,9 @@ def price_again(
         if not isinstance(cost, Clearance):
             found = rates_along(cost, drive.frames.at(element, shares) + offset, twists)
         if cost.per == "metre":
-            planar = twists[:, 0] ** 2 + twists[:, 1] ** 2
-            found[paid] *= np.sqrt(planar + (twists[:, 3:] ** 2).sum(axis=1))
+            found[paid] *= np.sqrt((np.delete(twists, 2, axis=1) ** 2).sum(axis=1))
         return found.reshape(-1, SHARES.size)
 
-    if not lasting.size:
-        return 0.0
     spans = evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
     done = 0.0
     for _ in range(MOST_ROUNDS):
@@ -78,9 +76,14 @@ def price_again(
         seconds = lasting[spans.element] * (spans.end - spans.begin)
         fine = values @ KRONROD * seconds
         off = np.abs(fine - values @ LOBATTO * seconds)
-        if off.sum() <= CLOSE * whole:
+        hides = np.zeros(len(off), dtype=bool)
+        if isinstance(cost, Ground):
+            middles = drive.frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + offset
+            ways = seconds * drive.frames.speed[spans.element]
+            hides = cost.unseen(middles[:, :2], ways, seconds) > CLOSE * whole
+        if off.sum() <= CLOSE * whole and not hides.any():
             return done + float(fine.sum())
-        again = off > 0.25 * CLOSE * whole / len(off)
+        again = hides | (off > 0.25 * CLOSE * whole / len(off))
         done += float(fine[~again].sum())
         rest, fine = spans.of(again), fine[again]
         middle = 0.5 * (rest.begin + rest.end)

@@ -237,15 +237,15 @@ def _independent(jacobian: Array) -> IntArray:
 
 
 def _closed(task: _Relaxation, times: Array) -> Array | None:
-    """Times near `times` that meet the equality constraints; None if they would be negative."""
-    used = times > 0.0
-    used[: task.first] = False
+    """Times near `times` that meet all constraints but for rounding; None where none are found."""
+    used = (times > 0.0) & (np.arange(times.size) >= task.first)
     for _ in range(CLOSING_STEPS):
-        values, jacobian = task.exact(times)
+        (values, jacobian), (room, slopes) = task.exact(times), task.room(times)
+        beyond = room < -INSIDE
+        values, jacobian = np.append(values, room[beyond]), np.vstack([jacobian, slopes[beyond]])
         if not values.size or not used.any():
             break
         times = times.copy()
         times[used] -= np.linalg.lstsq(jacobian[:, used], values, rcond=RANK)[0]
-    room = task.room(times)[0]
-    fine = (times >= 0.0).all() and (not room.size or bool((room >= -math.sqrt(ACCURACY)).all()))
+    fine = times.min(initial=0.0) >= 0.0 and task.room(times)[0].min(initial=0.0) >= -INSIDE
     return times if fine else None

@@ -1,5 +1,6 @@
 """The best coasting times of a word, where places cost something."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -83,6 +84,15 @@ def test_a_moved_word_has_the_same_times(name):
     other = with_relaxed_end(there, BEGUN.moved(by), there.goals[0])
     assert other.durations == pytest.approx(one.durations, abs=1e-6)
     assert there.cost_of(other) == pytest.approx(here.cost_of(one), rel=1e-8)
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_a_tolerance_is_used_and_kept(name):
+    exact = problem(COSTS[name])
+    here = replace(exact, goals=(ma.Goal(BEGUN.end, tolerance_m=0.8),))
+    better = with_relaxed_end(here, BEGUN, here.goals[0])
+    assert math.dist(better.end[:2], BEGUN.end[:2]) <= 0.8
+    assert here.cost_of(better) < here.cost_of(with_relaxed_end(exact, BEGUN, exact.goals[0]))
 
 
 @pytest.mark.parametrize("name", COSTS)

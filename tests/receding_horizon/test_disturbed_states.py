@@ -107,7 +107,7 @@ def test_five_hundred_loops(name: str, seed: int) -> None:
 def test_the_value_falls_by_what_was_driven_between_disturbances(name: str) -> None:
     """One disturbance, then none: the paper's decrease holds in every step but that one."""
     problem = problem_of(name, 0)
-    loop = ma.RecedingHorizon(problem, step=0.5, time_limit=2.0)
+    loop = ma.RecedingHorizon(problem, step=0.2, time_limit=2.0)
     rng = np.random.default_rng(7)
     low, high = problem.automaton.model.reduced_limits.T
     pose, state, taken = problem.start, problem.start_state, []

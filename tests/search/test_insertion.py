@@ -291,7 +291,8 @@ def test_trims_last_as_long_as_they_have_to(name):
 CASES = """
 import json, sys
 import numpy as np
-from maneuver_automaton.search import search_insertion, search_words
+from maneuver_automaton.search.choose import search_insertion
+from maneuver_automaton.search.words import search_words
 from maneuver_automaton.words import solve_switching_times, steer
 from tests.search.cases import *
 answers = []
