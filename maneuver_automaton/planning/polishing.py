@@ -159,9 +159,14 @@ class Polish(PlanningStep):
             return True  # it is there already
         first = known[0][0] if known else None
         stage_cost, places = price.stage_cost(first), price.places(first)
-        solid = _without_passed(problem, known[0][0]) if known else problem
-        work = iterations_within(budget)
-        for goal_index, guesses in _in_groups(found, known, self.guesses, budget):
+        solids = _without_passed(problem, known[0][0]) if known else [problem]
+        work, before = iterations_within(budget), found.cost
+        for solid, goal_index, guesses in (
+            (solid, *group)
+            for solid in solids
+            if found.cost == before
+            for group in _in_groups(found, known, self.guesses, budget)
+        ):
             if budget.is_over or (work is not None and work <= 0):
                 break
             try:
@@ -288,24 +293,30 @@ def iterations_within(budget: Budget) -> int | None:
     return None if most is None else FEWEST_ITERATIONS + most // EXPANSIONS_AN_ITERATION
 
 
-def _without_passed(problem: Problem, known: Plan) -> Problem:
-    """The problem without obstacles above or below which a `known` plan passes: all are high."""
-    if not any(isinstance(one, Obstacle) and one.height for one in problem.obstacles):
-        return problem
+def _without_passed(problem: Problem, known: Plan) -> list[Problem]:
+    """The problem without obstacles that a `known` plan passes above or below: all are high.
+
+    Before that, if it is another one, without those that are above or below it where it is nearest.
+    """
     origin, body = origin_near(known.start[:2]), parts_of(problem.footprint)
     times = known.start_time + np.linspace(0.0, known.duration, SAMPLES)
-    poses = known.pose_at(times)[:, :3].copy()
+    poses = known.pose_at(times).copy()
     poses[:, :2] -= origin
-    kept = [
-        one
-        for one in problem.obstacles
-        if not (isinstance(one, Obstacle) and one.height)
-        or surroundings_of((replace(one, height=None),), origin)
-        .nearest(body, poses, times)
-        .distance.min()
-        > problem.margin
+    near, over = list[AnyObstacle](), list[AnyObstacle]()
+    for one in problem.obstacles if problem.start.size > 3 else ():
+        if not (isinstance(one, Obstacle) and one.height):
+            continue
+        around = surroundings_of((replace(one, height=None),), origin)
+        apart = around.nearest(body, poses[:, :3], times).distance
+        low, high = poses[apart.argmin(), 3] + problem.body_height
+        near += [one] if max(low - one.height[1], one.height[0] - high) > problem.margin else []
+        over += [one] if apart.min() <= problem.margin else []
+    return [
+        replace(problem, obstacles=[one for one in problem.obstacles if one not in passed])
+        if passed
+        else problem
+        for passed in ([near, over] if len(near) > len(over) else [over])
     ]
-    return replace(problem, obstacles=tuple(kept))
 
 
 def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
@@ -469,7 +480,7 @@ def _polished_through(
                 break
     known = replace(known, durations=moving)
     price = polished_price(problem)
-    task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
+    task = polish_task(_without_passed(problem, known)[-1], goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
     times, count = [*times, known.duration], intervals_for(known.duration)
     nodes = np.round(count * np.array(times) / known.duration).astype(int)
