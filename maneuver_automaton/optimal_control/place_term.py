@@ -1,10 +1,10 @@
 """Prices of places in polishing: a convex model of them about the last answer, written anew.
 
-Of a rate numbers alone are known. It is looked at beside each node as far as the next answer may be
+Of a rate numbers alone are known. It is looked at beside the way as far as the next answer may be
 from there, so that the ridge between two walls and the border of an area are seen. The price of a
-way is a sum over its nodes: the model has its slope in all that moves, and curves as the rates do,
-but not along the way: a node that slides changes no price. Rates times symbols for the way were
-tried: they are not convex, and take the solver ten times as many iterations.
+way is a sum over its nodes and looks between: the model has its slope in all that moves, and curves
+as the rates do, but not along the way: a node that slides changes no price. Rates times symbols for
+the way were tried: they are not convex, and take the solver ten times as many iterations.
 """
 
 from __future__ import annotations

@@ -118,9 +118,8 @@ def polished_price(problem: Problem) -> PolishedPrice:
 def prices_metres_alone(cost: StageCost) -> bool:
     """Whether a cost prices the length of a motion, and neither its time nor its controls."""
     terms = terms_of(cost)
-    if terms is None:
-        return False
-    return terms.length > 0.0 and not any((terms.time, terms.effort, terms.norm))
+    others = () if terms is None else (terms.time, terms.effort, terms.norm)
+    return terms is not None and terms.length > 0.0 and not any(others)
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:

@@ -195,11 +195,9 @@ def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan
     cheapest = sorted(every, key=lambda one: price.of(one[0]))[:1]
     quickest = sorted(every, key=lambda one: one[0].duration)[:1]
     known = [*cheapest, *(one for one in quickest if one not in cheapest)]
-    if not known:
-        # one that is late may be made quicker, one maneuver of too many trims, one too fast for a
-        # zone slower
-        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
-    return known
+    # One that is late may be made quicker, one maneuver of too many trims, one too fast for a zone
+    # slower.
+    return known or sorted(found.misfits, key=lambda one: one[0].duration)[:1]
 
 
 def _in_groups(
@@ -209,11 +207,9 @@ def _in_groups(
     problem = found.problem
     if known:
         yield from _by_goal(problem, _guesses(found, known, paths, budget))
-    if problem.moves:
-        return  # a path knows nothing of time
     model = problem.automaton.model
     led = path_guesses(model) is not None and not follows_paths(model)  # paths are guesses only
-    if led and problem.rests_at_both_ends:
+    if led and problem.rests_at_both_ends and not problem.moves:  # they know nothing of time
         yield from _by_goal(problem, guesses_along_paths(problem, budget))
 
 
@@ -312,7 +308,7 @@ def _without_passed(problem: Problem, known: Plan) -> list[Problem]:
         near += [one] if max(low - one.height[1], one.height[0] - high) > problem.margin else []
         over += [one] if apart.min() <= problem.margin else []
     return [
-        replace(problem, obstacles=[one for one in problem.obstacles if one not in passed])
+        replace(problem, obstacles=tuple(one for one in problem.obstacles if one not in passed))
         if passed
         else problem
         for passed in ([near, over] if len(near) > len(over) else [over])
@@ -365,18 +361,13 @@ def polish_plans(
 
     With `most_iterations` of the solver the work is counted, and time only ends it earlier.
     """
-    task = polish_task(problem, goal_index, places)
-
-    def sound(motion: PolishedMotion) -> bool:
-        return accepts(_plan_of(problem, goal_index, motion))
-
     return polish_guesses(
-        task,
+        polish_task(problem, goal_index, places),
         guesses,
         stage_cost=stage_cost,
         budget=budget,
         most_iterations=most_iterations,
-        accepts=sound,
+        accepts=lambda motion: accepts(_plan_of(problem, goal_index, motion)),
     )
 
 
@@ -504,9 +495,8 @@ def _polished_through(
     motions = polish_through(
         task, guess, via, stays=standing, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
-    if isinstance(motions, str):
-        return None
-    return _plan_of(problem, goal_index, *motions, stays=stays)
+    found = [] if isinstance(motions, str) else motions
+    return _plan_of(problem, goal_index, *found, stays=stays) if found else None
 
 
 def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
