@@ -124,10 +124,8 @@ def _costlier(now: Moment) -> Iterator[FleetViolation]:
     sum_now = sum_before = 0.0
     fewer_arrive_not = False  # then the sum, which was infinite, has fallen
     for k, found in now.held.items():
-        if k in now.disturbed:
-            continue
-        name, (was, arrived) = vehicles[k].name, now.before[k]
-        value, promised = now.left_to_pay(k), said_then.get(name, math.inf)
+        (was, arrived), name, value = now.before[k], vehicles[k].name, now.left_to_pay(k)
+        promised = math.inf if k in now.disturbed else said_then.get(name, math.inf)
         if was < math.inf:
             sum_now, sum_before = sum_now + value, sum_before + was
         fewer_arrive_not = fewer_arrive_not or value < was == math.inf

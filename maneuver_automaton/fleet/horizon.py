@@ -225,12 +225,12 @@ class FleetHorizon:
         for k in [k for k in now.held if k not in now.poses]:
             del now.held[k]
         let_in(now)
-        now.before = {k: (now.left_to_pay(k), one.arrives) for k, one in now.held.items()}
         state.agreement.begin(now.number, now.held)
         rejoin(now)
         stop(now, stopped & set(now.held))
         plan_anew(now)
         note_arrivals(now)
+        now.before = {k: (now.left_to_pay(k), one.arrives) for k, one in now.held.items()}
         exchange_what_is_due(now)
         go_on(now)
         exchange(now)

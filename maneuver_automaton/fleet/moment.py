@@ -150,7 +150,8 @@ class Moment:
         self.swaps: list[Swap] = []
         self.in_group: set[int] = set()  # who exchanged its plan with others at once
         self.asked: list[int] = []  # who looked for a better plan
-        self.before: dict[int, tuple[float, float]] = {}  # what was left to pay, and the arrival
+        # What was left to pay, and the arrival, before any exchange: after plans are rejoined.
+        self.before: dict[int, tuple[float, float]] = {}
         self.off: dict[int, float] = {}
         # Who has another plan, or another problem, not by an exchange of its own.
         self.disturbed: set[int] = set(state.assigned)

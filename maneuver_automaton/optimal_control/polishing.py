@@ -442,40 +442,16 @@ def polish(
     begin: Begin = Begin.GUESS,
     budget: Budget = UNLIMITED,
 ) -> Polished:
-    """A local optimum among obstacles near a guess.
+    """A local optimum among obstacles near a guess; raises MissingExtra without CasADi.
 
-    Parameters
-    ----------
-    model : Model
-        The vehicle.
-    ends : MotionEnds
-        First and last pose and reduced state, in the frame of the scene.
-    scene : PolishScene
-        What must not be touched, seen from a frame nearby.
-    guess : Guess
-        States at equal steps, controls between them, and how long it takes; it sets the number of
-        intervals. Defects are allowed.
-    stage_cost : callable, optional
-        Cost per second ``l(z, u)`` on top of 1 for the time.
-    settings : PolishSettings
-    fixed_planes : bool
-        Keep the lines as the guess has them: quicker, and harder to fail.
-    elastic : bool
-        Let the body into obstacles at a price: for guesses that are inside. What comes
-        out may still touch, and is a guess itself.
-    gears : (n - 1,) array, optional
-        Sign of the speed ahead in every interval; stretches of one sign take their own time.
-    via : sequence of (int, tuple)
-        Nodes that are passed on the way; stretches between them take their own time.
-    begin : Begin
-        Nearby, where the guess is a solution with other steps.
-    budget : Budget
-        Its time is for all there is to do; every iteration of the solver asks it.
-
-    Raises
-    ------
-    MissingExtra
-        If CasADi is not installed.
+    `ends`: first and last pose and reduced state, in the frame of the scene. `guess`: at equal
+    steps, which set the number of intervals; defects are allowed. `stage_cost`: per second, on top
+    of 1 for the time. `fixed_planes`: the lines stay as the guess has them: quicker, and harder to
+    fail. `elastic`: the body may be inside obstacles at a price, for guesses that are; what comes
+    out may still touch, and is a guess itself. `gears` (n - 1,): sign of the speed ahead in every
+    interval; stretches of one sign take their own time, and so do those between nodes that are
+    passed on the way, `via`. `begin`: nearby, where the guess is a solution with other steps.
+    `budget`: its time is for all there is to do; every iteration of the solver asks it.
     """
     began, ends = budget.elapsed, ends.settled
     via = [(node, settled_state(state)) for node, state in via]

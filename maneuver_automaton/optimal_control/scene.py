@@ -190,8 +190,11 @@ class Guard(NamedTuple):
     solids: tuple[Solid, ...] | None = None  # None: everywhere
 
 
-PlacesAt = Callable[[Array, Array, Array], Array]
-"""Rates (n, 2) per metre and per second at poses (n, dof), reduced states and controls."""
+class PlacesAt(NamedTuple):
+    """What places cost."""
+
+    rates: Callable[[Array, Array, Array], Array]  # (n, 2) a metre, a second: pose, state, control
+    scale: float = math.inf  # [m] nothing that is priced is finer
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

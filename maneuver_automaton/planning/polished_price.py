@@ -17,7 +17,7 @@ from maneuver_automaton.groups import group_of
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import LEAST_DURATION, MOST_DURATION, PlacesAt
-from maneuver_automaton.places import PER, rates_along
+from maneuver_automaton.places import PER, rates_along, scale_of, smoothed
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
@@ -56,16 +56,16 @@ class PolishedPrice:
         if not (costs and unit > 0.0):
             return None
         model, start = self.problem.automaton.model, self.problem.start
-        group = group_of(start.size)
+        group, smooth = group_of(start.size), [smoothed(one) for one in costs]
 
         def at(poses: Array, states: Array, controls: Array) -> Array:
             world = np.asarray((group(start) @ group(poses)).pose)
             twists, rates = model.body_velocity(states, controls), np.zeros((len(poses), 2))
-            for one in costs:
+            for one in smooth:
                 rates[:, PER.index(one.per)] += rates_along(one, world, twists, states) / unit
             return rates
 
-        return at
+        return PlacesAt(at, min(map(scale_of, costs)))
 
     def stage_cost(self, known: Plan | None) -> RunningCost | None:
         """Cost per second beside 1 for the time; None if there is none.
@@ -118,9 +118,8 @@ def polished_price(problem: Problem) -> PolishedPrice:
 def prices_metres_alone(cost: StageCost) -> bool:
     """Whether a cost prices the length of a motion, and neither its time nor its controls."""
     terms = terms_of(cost)
-    if terms is None:
-        return False
-    return terms.length > 0.0 and not any((terms.time, terms.effort, terms.norm))
+    others = () if terms is None else (terms.time, terms.effort, terms.norm)
+    return terms is not None and terms.length > 0.0 and not any(others)
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:

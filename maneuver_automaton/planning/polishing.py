@@ -159,9 +159,14 @@ class Polish(PlanningStep):
             return True  # it is there already
         first = known[0][0] if known else None
         stage_cost, places = price.stage_cost(first), price.places(first)
-        solid = _without_passed(problem, known[0][0]) if known else problem
-        work = iterations_within(budget)
-        for goal_index, guesses in _in_groups(found, known, self.guesses, budget):
+        solids = _without_passed(problem, known[0][0]) if known else [problem]
+        work, before = iterations_within(budget), found.cost
+        for solid, goal_index, guesses in (
+            (solid, *group)
+            for solid in solids
+            if found.cost == before
+            for group in _in_groups(found, known, self.guesses, budget)
+        ):
             if budget.is_over or (work is not None and work <= 0):
                 break
             try:
@@ -190,11 +195,9 @@ def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan
     cheapest = sorted(every, key=lambda one: price.of(one[0]))[:1]
     quickest = sorted(every, key=lambda one: one[0].duration)[:1]
     known = [*cheapest, *(one for one in quickest if one not in cheapest)]
-    if not known:
-        # one that is late may be made quicker, one maneuver of too many trims, one too fast for a
-        # zone slower
-        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
-    return known
+    # One that is late may be made quicker, one maneuver of too many trims, one too fast for a zone
+    # slower.
+    return known or sorted(found.misfits, key=lambda one: one[0].duration)[:1]
 
 
 def _in_groups(
@@ -204,11 +207,9 @@ def _in_groups(
     problem = found.problem
     if known:
         yield from _by_goal(problem, _guesses(found, known, paths, budget))
-    if problem.moves:
-        return  # a path knows nothing of time
     model = problem.automaton.model
     led = path_guesses(model) is not None and not follows_paths(model)  # paths are guesses only
-    if led and problem.rests_at_both_ends:
+    if led and problem.rests_at_both_ends and not problem.moves:  # they know nothing of time
         yield from _by_goal(problem, guesses_along_paths(problem, budget))
 
 
@@ -288,24 +289,30 @@ def iterations_within(budget: Budget) -> int | None:
     return None if most is None else FEWEST_ITERATIONS + most // EXPANSIONS_AN_ITERATION
 
 
-def _without_passed(problem: Problem, known: Plan) -> Problem:
-    """The problem without obstacles above or below which a `known` plan passes: all are high."""
-    if not any(isinstance(one, Obstacle) and one.height for one in problem.obstacles):
-        return problem
+def _without_passed(problem: Problem, known: Plan) -> list[Problem]:
+    """The problem without obstacles that a `known` plan passes above or below: all are high.
+
+    Before that, if it is another one, without those that are above or below it where it is nearest.
+    """
     origin, body = origin_near(known.start[:2]), parts_of(problem.footprint)
     times = known.start_time + np.linspace(0.0, known.duration, SAMPLES)
-    poses = known.pose_at(times)[:, :3].copy()
+    poses = known.pose_at(times).copy()
     poses[:, :2] -= origin
-    kept = [
-        one
-        for one in problem.obstacles
-        if not (isinstance(one, Obstacle) and one.height)
-        or surroundings_of((replace(one, height=None),), origin)
-        .nearest(body, poses, times)
-        .distance.min()
-        > problem.margin
+    near, over = list[AnyObstacle](), list[AnyObstacle]()
+    for one in problem.obstacles if problem.start.size > 3 else ():
+        if not (isinstance(one, Obstacle) and one.height):
+            continue
+        around = surroundings_of((replace(one, height=None),), origin)
+        apart = around.nearest(body, poses[:, :3], times).distance
+        low, high = poses[apart.argmin(), 3] + problem.body_height
+        near += [one] if max(low - one.height[1], one.height[0] - high) > problem.margin else []
+        over += [one] if apart.min() <= problem.margin else []
+    return [
+        replace(problem, obstacles=tuple(one for one in problem.obstacles if one not in passed))
+        if passed
+        else problem
+        for passed in ([near, over] if len(near) > len(over) else [over])
     ]
-    return replace(problem, obstacles=tuple(kept))
 
 
 def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
@@ -354,18 +361,13 @@ def polish_plans(
 
     With `most_iterations` of the solver the work is counted, and time only ends it earlier.
     """
-    task = polish_task(problem, goal_index, places)
-
-    def sound(motion: PolishedMotion) -> bool:
-        return accepts(_plan_of(problem, goal_index, motion))
-
     return polish_guesses(
-        task,
+        polish_task(problem, goal_index, places),
         guesses,
         stage_cost=stage_cost,
         budget=budget,
         most_iterations=most_iterations,
-        accepts=sound,
+        accepts=lambda motion: accepts(_plan_of(problem, goal_index, motion)),
     )
 
 
@@ -469,7 +471,7 @@ def _polished_through(
                 break
     known = replace(known, durations=moving)
     price = polished_price(problem)
-    task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
+    task = polish_task(_without_passed(problem, known)[-1], goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
     times, count = [*times, known.duration], intervals_for(known.duration)
     nodes = np.round(count * np.array(times) / known.duration).astype(int)
@@ -493,9 +495,8 @@ def _polished_through(
     motions = polish_through(
         task, guess, via, stays=standing, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
-    if isinstance(motions, str):
-        return None
-    return _plan_of(problem, goal_index, *motions, stays=stays)
+    found = [] if isinstance(motions, str) else motions
+    return _plan_of(problem, goal_index, *found, stays=stays) if found else None
 
 
 def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:

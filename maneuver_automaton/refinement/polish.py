@@ -196,27 +196,12 @@ def polish_guesses(
     most_iterations: int | None = None,
     accepts: Accepts = lambda motion: True,
 ) -> PolishResult:
-    """The best exact motion that some guesses lead to.
+    """The best exact motion that some guesses lead to; raises MissingExtra without CasADi.
 
-    Parameters
-    ----------
-    task : PolishTask
-    guesses : iterable of Guess
-        Seen from the start, the most promising first; see `guesses`. Asked for one by one.
-    stage_cost : callable, optional
-        Cost per second ``l(z, u)`` on top of 1 for the time.
-    budget : Budget
-        Its time; every iteration of the solver asks it.
-    most_iterations : int, optional
-        Of the solver, over all guesses: the attempts then do not depend on the clock, unless the
-        time is over before.
-    accepts : callable
-        Whether a motion is sound, say by an audit: solver success proves nothing.
-
-    Raises
-    ------
-    MissingExtra
-        If CasADi is not installed.
+    `guesses`: seen from the start, the most promising first, asked for one by one; see there.
+    `stage_cost`: per second, on top of 1 for the time. `most_iterations` of the solver, over all
+    guesses: the attempts then do not depend on the clock, unless the time is over before.
+    `accepts`: whether a motion is sound, say by an audit: solver success proves nothing.
     """
     return _Polishing(task, task.scene, guesses, stage_cost, budget, most_iterations, accepts).run()
 

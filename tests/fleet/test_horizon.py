@@ -244,6 +244,16 @@ def test_value_and_arrival():
     ]
 
 
+@pytest.mark.parametrize(("cost", "costlier"), [(1.0, []), (1.6, [("a", "b")])])
+def test_the_sum_of_a_group_counts_one_that_rejoined_its_plan(cost, costlier):
+    now = pair()
+    now.disturbed, now.in_group = {0}, {0, 1}
+    for k, new in enumerate((cost, 2.5)):
+        now.held[k] = found_on(now.vehicles[k], cost=new, start=now.held[k].plan.start)
+    now.state.agreement.start(now.held)
+    assert broken_by(now) == [(FleetGuarantee.DECREASE, names) for names in costlier]
+
+
 def test_still_is_free():
     now = pair()
     vehicle = now.vehicles[0]

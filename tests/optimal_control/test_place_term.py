@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from maneuver_automaton import Box, Clearance, Plan, Problem
+from maneuver_automaton import Box, Clearance, Ground, Plan, Problem
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.optimal_control.place_term import place_term, price_of_places
-from maneuver_automaton.optimal_control.scene import Point
+from maneuver_automaton.optimal_control.scene import PlacesAt, Point
 from maneuver_automaton.planning.polished_price import polished_price
 from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
 from maneuver_automaton.primitives import Trim
@@ -37,9 +38,11 @@ def wave(count: int = 40) -> Point:
     return Point(state, rng.uniform(-0.3, 0.3, (count - 1, 2)), np.diff(times))
 
 
-def test_its_slope_is_that_of_the_price() -> None:
+@pytest.mark.parametrize("scale", [math.inf, 0.05])  # looks at nodes, and at three between two
+def test_its_slope_is_that_of_the_price(scale: float) -> None:
     point, rng = wave(), np.random.default_rng(7)
-    model = place_term(hills, point, 3, beside=1e-3)
+    places = PlacesAt(hills, scale)
+    model = place_term(places, point, 3, beside=1e-3)
     for _ in range(5):
         by = 1e-5 * rng.normal(size=point.state.shape)
         longer = 1e-5 * rng.normal(size=point.durations.shape)
@@ -47,8 +50,20 @@ def test_its_slope_is_that_of_the_price() -> None:
             Point(point.state + sign * by, point.control, point.durations + sign * longer)
             for sign in (1.0, -1.0)
         )
-        asked = price_of_places(hills, ahead, 3) - price_of_places(hills, behind, 3)
+        asked = price_of_places(places, ahead, 3) - price_of_places(places, behind, 3)
         assert model.price(ahead) - model.price(behind) == pytest.approx(asked, rel=1e-3)
+
+
+def test_an_area_between_two_nodes_costs_what_it_does_along_the_way() -> None:
+    problem = replace(
+        corridor(SE2([0.0, 0.0, 0.0])), place_costs=Ground(Box([0.3, 1.0], [8.0, -0.5]))
+    )
+    times = np.linspace(0.0, 16.0, 17)  # of nodes a metre apart, none of which is in the area
+    state = np.outer(times + 0.5, [1.0, 0.0, 0.0, 0.0, 0.0])
+    places = polished_price(problem).places(None)
+    assert places is not None
+    point = Point(state, np.zeros((16, 2)), np.diff(times))
+    assert price_of_places(places, point, 3) == pytest.approx(0.3, rel=0.2)
 
 
 def corridor(place: SE2) -> Problem:

@@ -9,6 +9,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
@@ -16,7 +17,8 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.lattice_words import LatticeWords
-from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
+from maneuver_automaton.planning.polishing import _without_passed, guess_of_plan, polish_plans
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import simulate
 from tests.inertia import resting
@@ -182,3 +184,19 @@ def test_in_closed_loop_past_what_moves_no_motion_of_one_piece_is_driven():
     known = {maneuver.name for maneuver in ROBOT.maneuvers}
     for step in loop.steps:
         assert all(one is None or one.name in known for one in step.plan.maneuvers)
+
+
+@pytest.mark.parametrize(
+    ("height", "across", "left"),
+    [((4.0, 9.0), 3.0, [0, 1]), ((0.0, 9.0), 3.0, [1]), ((4.0, 9.0), 0.0, [0])],
+    ids=["below one that is beside it", "beside one", "below one"],
+)
+def test_what_is_above_or_below_is_left_out_and_then_what_is_only_beside_stays(
+    height, across, left
+):
+    library = load_stock_library("helicopter")
+    bridge = Obstacle(Disc(1.0, [10.0, across]), height=height)
+    problem = Problem(library, [0, 0, 0, 2], [20, 0, 0, 2], obstacles=bridge, footprint=Disc(1.0))
+    on = Trim(name="on", body_velocity=[2.0, 0.0, 0.0, 0.0], control=library.trims[0].control)
+    straight = Plan([0.0, 0.0, 0.0, 2.0], (on,), durations=[10.0])
+    assert [len(one.obstacles) for one in _without_passed(problem, straight)] == left
