@@ -207,6 +207,20 @@ def field_bound(field: Field, body: Body, place: Place, least: float) -> float:
 
 
 @bare_inner_kernel
+def field_look(field: Field, body: Body, place: Place) -> tuple[float, bool]:
+    """`field_bound` and `surely_hits` from one look at the field."""
+    best, hits = math.inf, False
+    for d in range(body.discs.shape[0]):
+        known, e_x, e_y = field_at(field, body, d, place)
+        away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
+        best = min(best, known - away - body.discs[d, 2])
+        if known + away < body.discs[d, 3]:
+            hits = True
+            break
+    return best, hits
+
+
+@bare_inner_kernel
 def surely_hits(field: Field, body: Body, place: Place) -> bool:
     """Whether a solid reaches into one of the discs inside the body, as the field tells."""
     for d in range(body.discs.shape[0]):
