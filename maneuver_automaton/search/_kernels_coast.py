@@ -13,7 +13,7 @@ import math
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_static, free_time
-from maneuver_automaton.collision._kernels_clearance import surely_hits
+from maneuver_automaton.collision._kernels_clearance import field_look
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import not_parted
 from maneuver_automaton.collision.arrays import Coast, Place, WorldArrays
@@ -256,7 +256,7 @@ def coast_hits(
     for _ in range(steps):
         x, y = x + c * d_x - s * d_y, y + s * d_x + c * d_y
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-        if surely_hits(scene.layers.first.field, body, Place(x, y, c, s)):
+        if field_look(scene.layers.first.field, body, Place(x, y, c, s))[1]:
             return True
     return False
 
