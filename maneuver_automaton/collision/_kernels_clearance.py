@@ -207,16 +207,19 @@ def field_bound(field: Field, body: Body, place: Place, least: float) -> float:
 
 
 @bare_inner_kernel
-def surely_hits(field: Field, body: Body, place: Place) -> bool:
-    """Whether a solid reaches into one of the discs inside the body, as the field tells."""
+def field_look(field: Field, body: Body, place: Place) -> tuple[float, bool]:
+    """`field_bound`, and whether a solid surely reaches into one of the discs inside the body."""
+    best, hits = math.inf, False
     for d in range(body.discs.shape[0]):
-        # As in `field_bound`, but that distances grow no faster, either. Outside of the field they
-        # are at least what holds there, more than the radius of any such disc.
+        # Distances grow no faster than their places move apart, either. Outside of the field they
+        # are at least what holds there, more than the radius of any disc inside.
         known, e_x, e_y = field_at(field, body, d, place)
-        left = (body.discs[d, 3] - known) / field.cell
-        if left > 0.0 and e_x * e_x + e_y * e_y < left * left:
-            return True
-    return False
+        away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
+        best = min(best, known - away - body.discs[d, 2])
+        hits = known + away < body.discs[d, 3]
+        if hits:
+            break
+    return best, hits
 
 
 @bare_inner_kernel

@@ -13,9 +13,9 @@ import math
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_static, free_time
-from maneuver_automaton.collision._kernels_clearance import surely_hits
+from maneuver_automaton.collision._kernels_clearance import field_look
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
-from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
+from maneuver_automaton.collision._kernels_swept import not_parted
 from maneuver_automaton.collision.arrays import Coast, Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
@@ -159,28 +159,22 @@ def coast_proven(
 
 
 @bare_inner_kernel
-def edge_swept(
-    scene: Scene, lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
-) -> int:
+def edge_swept(scene: Scene, lib: LatticeArrays, motion: int, place: Place) -> int:
     """A solid that may be in the way of an edge of coasting, FREE for none, or UNKNOWN."""
-    # `motion`: place in `lib.coasts.swept`. FREE is a proof, and what it calls free `coast_proven`
-    # would too: no pose along the edge comes as near to a solid as it would stop at.
-    if not is_one_in_plane(scene, lib):
-        return UNKNOWN
-    place = Place(pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
+    # `motion`: place in `lib.coasts.swept`. Asked of one body in one plane. FREE is a proof, and
+    # what it calls free `coast_proven` would too: no pose along the edge comes as near to a solid
+    # as it would stop at.
     swept, enough = lib.coasts.swept, scene.keep + scene.margin
     return not_parted(scene.layers.first, lib.parts.body, swept, motion, place, enough)
 
 
 @bare_inner_kernel
 def swept_end(
-    lib: LatticeArrays,
-    motion: int,
-    pose: tuple[float, float, float, float],
-    end: tuple[float, float, float, float],
+    lib: LatticeArrays, motion: int, place: Place, end: tuple[float, float, float, float]
 ) -> Place:
-    """The end of an edge of coasting from a pose, without a cosine and a sine of its own."""
-    c, s, places = math.cos(pose[2]), math.sin(pose[2]), lib.coasts.swept.places
+    """The end of an edge of coasting from a place, without a cosine and a sine of its own."""
+    _, _, c, s = place
+    places = lib.coasts.swept.places
     turn_c, turn_s = places[motion, 3], places[motion, 4]
     return Place(end[0], end[1], c * turn_c - s * turn_s, s * turn_c + c * turn_s)
 
@@ -262,7 +256,7 @@ def coast_hits(
     for _ in range(steps):
         x, y = x + c * d_x - s * d_y, y + s * d_x + c * d_y
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-        if surely_hits(scene.layers.first.field, body, Place(x, y, c, s)):
+        if field_look(scene.layers.first.field, body, Place(x, y, c, s))[1]:
             return True
     return False
 

@@ -15,9 +15,10 @@ import math
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, bare_shared_kernel
-from maneuver_automaton.collision._kernels_clearance import field_bound
+from maneuver_automaton.collision._kernels_clearance import field_bound, field_look
 from maneuver_automaton.collision._kernels_swept import FREE as NOTHING_MET
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, overlaps
+from maneuver_automaton.collision.arrays import Place
 from maneuver_automaton.search._kernels_coast import (
     coast_end,
     coast_inside,
@@ -25,6 +26,7 @@ from maneuver_automaton.search._kernels_coast import (
     coasted,
     edge_end,
     edge_swept,
+    is_one_in_plane,
     may_stay,
     swept_end,
     too_short,
@@ -170,11 +172,16 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
     # Clearance known from before spares a test, unless obstacles move, since it is that of an
     # earlier time, or there are zones, which it does not count.
     known = scene.layers.moving.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
-    priced = places_cost(scene)
+    priced, first = places_cost(scene), scene.layers.first
     cos, sin = math.cos(heading), math.sin(heading)
+    place, clear = Place(x, y, cos, sin), nodes[node, CLEARANCE]
+    looked, bound = known and is_one_in_plane(scene, lib), -math.inf
+    if looked:
+        bound = field_bound(first.field, lib.parts.body, place, -math.inf)
+        clear = max(clear, bound - scene.keep)
     held = class_of(lib.library, before)
-    for place in range(lib.first_trim[held], lib.first_trim[held + 1]):
-        trim = lib.trims_of[place]
+    for listed in range(lib.first_trim[held], lib.first_trim[held + 1]):
+        trim = lib.trims_of[listed]
         if before != trim and too_short(lib, before, run, limits.least_coast):
             continue
         count = int(links[node, COUNT]) + (0 if trim == before else 1)
@@ -185,6 +192,8 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
         layer = layer_of(cells, lib, trim, new_gear, count)
         lasted = run if trim == before else 0.0
         climbs = lib.library.twists[trim, 3] != 0.0 and not scene.layers.flat
+        # The coasts of a trim pass the same places: after `proven` seconds the clearance is `near`.
+        fastest, proven, near = lib.parts.fastest[trim], 0.0, clear
         for q in range(durations.shape[1]):
             t = durations[trim, q]
             if not t > 0.0 or lasted + t > lib.library.longest[trim]:
@@ -207,36 +216,45 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
                 continue
             if cost + ahead >= limit and not cut.kept:
                 continue
-            # The proof without a test: no point of the body moves farther than `fastest * t`, so
-            # the clearance shrinks by no more than that. A climb may lead into another layer, whose
-            # obstacles the clearance does not know.
-            clearance, free = nodes[node, CLEARANCE] - lib.parts.fastest[trim] * t, t
+            # The proof without a test: no point of the body moves farther than `fastest` times the
+            # time since a place where the clearance is known, so it shrinks by no more than that. A
+            # climb may lead into another layer, whose obstacles the clearance does not know.
+            clearance, free = near - fastest * abs(t - proven), t
             if clearance <= scene.margin or climbs or not known:
                 state[QUERIES] += 1
-                # The price of a proof rises in three steps: one polygon that holds all of the edge;
-                # where that meets a solid, whether the vehicle does at the end, or where the least
-                # that is kept of it would end; and the proof along the edge.
+                # The price of a proof rises in four steps: the field at the end; one polygon that
+                # holds all of the edge; where that meets a solid, whether the vehicle does at the
+                # end, or where the least that is kept of it ends; and the proof along the edge.
                 motion = trim * durations.shape[1] + q
-                met = edge_swept(scene, lib, motion, pose) if known else UNKNOWN
-                first = scene.layers.first
-                end = swept_end(lib, motion, pose, child)
+                end, met = swept_end(lib, motion, place, child), UNKNOWN
+                if looked:
+                    bound, hits = field_look(first.field, lib.parts.body, end)
+                    bound -= scene.keep
+                    # From both ends: halfway the clearance is not below half of what is left.
+                    if bound + clearance > 2.0 * scene.margin:
+                        met = NOTHING_MET
+                    elif hits and not cut.kept:
+                        break  # longer coasts of this trim pass the same place
+                    else:
+                        met = edge_swept(scene, lib, motion, place)
                 if met >= 0 and cut.kept:
-                    least = (cut.back_off + cut.shortest) / lib.parts.fastest[trim]
+                    least = (cut.back_off + cut.shortest) / fastest
                     end = coast_end(lib, trim, pose, task.sign * min(t, least))
                 if met == NOTHING_MET:
-                    clearance = field_bound(first.field, lib.parts.body, end, -math.inf)
-                    clearance = max(clearance - scene.keep, scene.margin)
+                    clearance = max(bound, scene.margin)
                 elif met >= 0 and overlaps(first, lib.parts.body, end, met):
                     free = 0.0
                 else:
                     clock = limits.clock + task.sign * spent
                     free, clearance = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
-            if free < t:
-                if not cut.kept or not lib.parts.fastest[trim] > 0.0:
+            if free >= t:
+                proven, near = t, clearance
+            else:
+                if not cut.kept or not fastest > 0.0:
                     break  # longer coasts of this trim pass the same place
                 # All before `free` is proven, so what is left of the edge needs no other proof.
-                t = free - cut.back_off / lib.parts.fastest[trim]
-                if t * lib.parts.fastest[trim] < cut.shortest:
+                t = free - cut.back_off / fastest
+                if t * fastest < cut.shortest:
                     break
                 fine, clearance = 1, 0.0
                 cost, time = done + price + t * lib.library.rates[trim], spent + t

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton._compile import inner_kernel, kernel
-from maneuver_automaton.collision._kernels_clearance import surely_hits
+from maneuver_automaton.collision._kernels_clearance import field_look
 from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, not_parted, overlaps
 from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.arrays import Place
@@ -70,17 +70,21 @@ def place_of(pose):
 
 
 @kernel
-def parted(world, body, swept, poses, enough, ends, out):
-    """`not_parted` of every pose and motion, and whether the end surely is not free."""
+def parted(world, body, swept, poses, enough, ends, reach, out):
+    """`not_parted` of every pose and motion, what the field says of the end, and of both ends."""
     for k in range(poses.shape[0]):
+        begins, _ = field_look(world.field, body, place_of(poses[k]))
         for motion in range(swept.places.shape[0]):
             p = not_parted(world, body, swept, motion, place_of(poses[k]), enough)
             out[k, motion, 0] = p
             end = place_of(ends[k, motion])
             if p >= 0 and overlaps(world, body, end, p):
                 out[k, motion, 1] = 1
-            if surely_hits(world.field, body, end):
+            bound, hits = field_look(world.field, body, end)
+            if hits:
                 out[k, motion, 1] = 2
+            if begins + bound > reach[motion] + 2.0 * enough:
+                out[k, motion, 2] = 1
 
 
 @pytest.mark.parametrize(("name", "keep"), [("truck", 0.1), ("point", 0.0)])
@@ -89,7 +93,7 @@ def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name,
     footprint, margin = scenes.FOOTPRINTS[name], 0.005
     twists = np.array(scenes.TWISTS)
     durations = np.full((len(twists), 2), [0.3, -1.8]) * rng.uniform(0.3, 1.0, (len(twists), 1))
-    verdicts = np.zeros(4, dtype=int)
+    verdicts = np.zeros(5, dtype=int)
     for _ in range(4):
         obstacles = scenes.random_scene(rng, moving=0)
         world = world_around(footprint, obstacles, keep=keep)
@@ -99,8 +103,9 @@ def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name,
         seen = world.into(poses)
         steps = SE2.exp(durations.reshape(-1, 1) * np.repeat(twists, 2, axis=0))
         ends = np.array([(SE2(pose) @ steps).pose for pose in seen])
-        met = np.zeros((len(poses), 2 * len(twists), 2), dtype=np.int64)
-        parted(world.arrays, world.body, swept, seen, keep + margin, ends, met)
+        met = np.zeros((len(poses), 2 * len(twists), 3), dtype=np.int64)
+        reach = (fastest_points(world.body, twists)[:, None] * np.abs(durations)).ravel()
+        parted(world.arrays, world.body, swept, seen, keep + margin, ends, reach, met)
         for motion in range(2 * len(twists)):
             twist, t = twists[motion // 2], durations[motion // 2, motion % 2]
             every = np.repeat(twist[None], len(poses), axis=0)
@@ -111,14 +116,14 @@ def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name,
             assert (free[called == FREE] == abs(t)).all()
             ends_in_it = met[:, motion, 1]
             assert (free[ends_in_it > 0] < abs(t)).all()
-            fastest = fastest_points(world.body, twist[None])[0]
+            from_both = met[:, motion, 2] > 0
+            assert (free[from_both] == abs(t)).all()
             for pose in poses[called == FREE]:
                 since = np.linspace(0.0, t, 9)
                 apart = exact.clearance(driven(pose, twist, since), since)
                 assert apart.min() >= keep + margin - 1e-8
             verdicts += [(called == one).sum() for one in (FREE, UNKNOWN)] + [
-                (called >= 0).sum(), (ends_in_it == 2).sum()
+                (called >= 0).sum(), (ends_in_it == 2).sum(), from_both.sum()
             ]  # fmt: skip
-            assert fastest >= 0.0
     assert verdicts[0] > 0
     assert (verdicts[2:] > 0).all() or name == "point"
