@@ -523,7 +523,7 @@ class Problem:
 
     def rates_of_trims(self, trims: Sequence[Trim]) -> Array:
         """Cost per second (n,) of some trims, which may be others than the library's."""
-        known = _known_rates(self.automaton, self.cost)
+        known = self._rates
         try:
             return np.array([known[trim] for trim in trims])
         except KeyError:
@@ -687,7 +687,12 @@ class Problem:
     @functools.cached_property
     def _same(self) -> dict[str, Any]:
         """What problems from other starts have in common with this one."""
-        return {"moves": self.moves, **{one.name: self.__dict__[one.name] for one in fields(self)}}
+        known = {one.name: self.__dict__[one.name] for one in fields(self)}
+        return {"moves": self.moves, "_rates": self._rates, **known}
+
+    @functools.cached_property
+    def _rates(self) -> dict[Trim, float]:
+        return _known_rates(self.automaton, self.cost)
 
     @property
     def setting(self) -> Problem:

@@ -234,7 +234,7 @@ class Plan(Played):
         [-2.0, 5.0, 3.141592654]
         """
         other: Plan = object.__new__(Plan)
-        placed = ("_kept", "switching_times", "switching_poses")
+        placed = ("_kept", "_asked", "switching_times", "switching_poses")
         known = {name: one for name, one in vars(self).items() if name not in placed}
         vars(other).update(known, start=start, start_time=start_time)
         plain_numbers(other)
@@ -338,13 +338,7 @@ class Plan(Played):
         if not self.trims:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         if not (times.ndim or any(self.maneuvers)):  # one time, of trims alone: plain numbers
-            time, durations = float(times), self.durations.tolist()
-            begins = [self.start_time + since for since in accumulate(durations[:-1], initial=0.0)]
-            k = bisect_right(begins, time, lo=1) - 1
-            lasting = [*durations[:k], min(max(time - begins[k], 0.0), durations[k])]
-            return end_of_coasting(
-                self.start, [trim.body_velocity for trim in self.trims[: k + 1]], lasting
-            )
+            return self._pose_at(float(times)).copy()
         index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
@@ -353,6 +347,18 @@ class Plan(Played):
             if isinstance(primitive, Maneuver) and (here := index == k).any():
                 steps[here] = _within(primitive, since[here])
         return (begin @ type(begin)(steps)).pose
+
+    def _pose_at(self, time: float) -> Array:
+        """The pose (dof,) at one time, of trims alone; kept, as loops ask for it a step later."""
+        known: tuple[float, Array] | None = vars(self).get("_asked")
+        if known is None or known[0] != time:
+            durations = self.durations.tolist()
+            begins = [self.start_time + since for since in accumulate(durations[:-1], initial=0.0)]
+            k = bisect_right(begins, time, lo=1) - 1
+            lasting = [*durations[:k], min(max(time - begins[k], 0.0), durations[k])]
+            twists = [trim.body_velocity for trim in self.trims[: k + 1]]
+            known = vars(self)["_asked"] = time, end_of_coasting(self.start, twists, lasting)
+        return known[1]
 
     def control_at(self, time: ArrayLike) -> Array:
         """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""

@@ -61,8 +61,8 @@ class InFreeSpace(StepSearch):
         now, here = self.now, self.here
         found: list[StepPlan] = []
         now.exhaustive = True
-        alternatives = PACES if self.settings.retimed else 0
-        searched = self.settings.continuous or bounded(here)
+        alternatives, limited = PACES if self.settings.retimed else 0, bounded(here)
+        searched = limited or self.settings.continuous
         for index, goal in enumerate(here.goals):
             same_goal = now.last is None or index == now.last.goal_index
             known = kept.plan if kept is not None and same_goal else None
@@ -82,7 +82,7 @@ class InFreeSpace(StepSearch):
             results = search_goal(
                 here,
                 goal,
-                alternatives=None if bounded(here) else alternatives,
+                alternatives=None if limited else alternatives,
                 budget=now.budget,
                 known=None if self.settings.continuous else known,
                 known_cost=cost,

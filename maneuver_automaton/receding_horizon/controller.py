@@ -345,9 +345,11 @@ class RecedingHorizon:
         )
         self._count(step, now)
         broken = (*now.violations, *self._broken(step, now))
+        if not broken:
+            return step
         taken = tuple(one for one in broken if _is_taken(one, now))
         kept = tuple(one for one in broken if one not in taken)
-        return replace(step, violations=kept, disturbed=taken) if broken else step
+        return replace(step, violations=kept, disturbed=taken)
 
     def _count(self, step: Step, now: Situation) -> None:
         """Bound the number of steps, from here on if something disturbed."""

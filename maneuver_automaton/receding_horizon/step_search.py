@@ -225,7 +225,7 @@ class StepSearch:
                 return replace(held, shifted_value=held.cost, arrived=True)
         if index is None and now.last is not None:
             before = now.last.goal_index
-            index = before if now.is_over and within(here.start, here.goals[before]) else None
+            index = before if within(here.start, here.goals[before]) and now.is_over else None
         if index is None:
             return None
         there = now.resting(index)

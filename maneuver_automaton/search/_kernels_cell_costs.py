@@ -146,6 +146,32 @@ def radius(twist: Array) -> complex:
 
 
 @bare_inner_kernel
+def is_solved(known: ClosedForm, time: float) -> bool:
+    """Whether both branches of the closed form are there at a free time, but for rounding."""
+    (v_q, w_q, _, _), (a, b, c), (at_1, at_2) = known.free, known.sides, known.at
+    (d, centre, arm), (velocity, _, speed), turn = known.ways, known.straight, 1.0 + 0j
+    if known.place == 0 and w_q != 0.0:
+        turn = unit(w_q * time)
+        d = centre + arm * turn
+    elif known.place == 0:
+        d -= v_q * time
+    elif known.place == 1:
+        at_1 += v_q * time
+    else:
+        at_2 += v_q * time
+    if a != 0.0 and b != 0.0 and c != 0.0:
+        one, two = length(at_1), length(at_2)
+        return abs(one - two) <= length(d) <= one + two
+    if b == 0.0:
+        point, radius = at_1 + at_2, length(d)
+    elif a == 0.0:
+        point, radius = d * turn.conjugate() - at_1, length(at_2)
+    else:
+        point, radius = d * known.goal[1].conjugate() - at_2, length(at_1)
+    return abs((point * velocity.conjugate()).imag) <= radius * speed
+
+
+@bare_inner_kernel
 def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, float]:
     """Lower bounds of what coasting costs in a word whose free time is from `low` to `high`."""
     # For both branches of the closed form, as in `steer`: three turns are ``at_1 e^{i h_1} + at_2

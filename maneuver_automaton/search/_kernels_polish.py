@@ -27,6 +27,7 @@ from maneuver_automaton.words._kernels_times import (
 )
 
 NEXT = 0.01  # relative, by which the cost of a start with one time free may be off
+SAME = 1e-7  # relative, of costs: starts that cost the same may lead to one solution
 MOMENT = 1e-6  # of the whole time: shorter trims may be due to rounding
 
 
@@ -154,10 +155,7 @@ def polish(
     m = problem.library.targets.size
     if n <= 4 and m == 0:
         costliest = found.best[found.best.size - 1]
-        cost = problem.terms.pad_cost + word_extra(problem, word, n)
-        for i in range(n):
-            cost += problem.library.rates[word[i]] * times[i]
-        if cost > costliest + NEXT * (1.0 + abs(costliest)):
+        if start_cost(problem, word, n, times) > costliest + NEXT * (1.0 + abs(costliest)):
             return
     some = columns_of(problem.library, word, n)
     if isolated == 0:
@@ -196,6 +194,29 @@ def is_neighbour(problem: TimesProblem, n: int, times: Array) -> bool:
     return worst < 1e-13 * (1.0 + abs(problem.goal[0]) + abs(problem.goal[1]))
 
 
+@bare_inner_kernel
+def start_cost(problem: WordProblem, word: IntArray, n: int, times: Array) -> float:
+    """What a word costs with the times from which it is refined."""
+    cost: float = problem.terms.pad_cost + word_extra(problem, word, n)
+    for i in range(n):
+        cost += problem.library.rates[word[i]] * times[i]
+    return cost
+
+
+@bare_inner_kernel
+def cheapest_start(problem: WordProblem, candidates: Candidates, count: int) -> int:
+    """The first of the starts that cost least, of those with no time free; -1 if none."""
+    # Of others several lead to one solution, and which of these comes first decides its last digit.
+    least, first = np.inf, -1
+    for k in range(count):
+        if candidates.isolated[k] == 0:
+            continue
+        cost = start_cost(problem, candidates.words[k], candidates.sizes[k], candidates.times[k])
+        if cost < least - SAME * (1.0 + abs(least)) or first < 0:
+            least, first = cost, k
+    return first
+
+
 @kernel
 def polish_candidates(
     problem: WordProblem, links: Links, candidates: Candidates, found: Found, max_trims: int
@@ -212,7 +233,14 @@ def polish_all(
     linked, width = links.cost.shape[0] > 1, candidates.words.shape[1]
     seen = room_for(problem, width) if linked else problem
     rows = np.empty(width, dtype=np.int64)
-    for k in range(min(candidates.counter[0], candidates.words.shape[0])):
+    count = min(candidates.counter[0], candidates.words.shape[0])
+    # Where one solution is asked for, others need not be refined once the cheapest one is known.
+    alone = found.best.size == 1 and problem.library.targets.size == 0 and not linked
+    first = cheapest_start(problem, candidates, count) if alone else -1
+    for step in range(-1, count):
+        k = first if step < 0 else step
+        if k < 0 or step == first:
+            continue
         word, size = candidates.words[k], candidates.sizes[k]
         if linked:
             look_ahead(problem, links, seen, word, size)

@@ -17,6 +17,7 @@ from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.search._kernels_cell_costs import (
     closed_form,
     has_bounds,
+    is_solved,
     least_costs,
     mark_cheap_cells,
 )
@@ -45,6 +46,7 @@ from maneuver_automaton.words._kernels_times import assign
 
 NOTHING = 1e-7  # [s] that only rounding leaves of a time: arc cosines lose half of the digits
 LEAST_NODES = 8
+HALVED = 30  # times, of a cell in which branches end
 
 
 @bare_inner_kernel
@@ -85,7 +87,8 @@ def scan_one(
                 continue
             if not may_be_cheap(room.costs[branch, j], room.costs[branch, j + 1], most):
                 continue
-            if first_interval(problem, candidates, four, branch, (j, nodes, reach), cheap < np.inf):
+            cell = j, nodes, reach, cheap < np.inf
+            if first_interval(problem, candidates, four, branch, cell, known):
                 bisect(problem, candidates, four, branch, known, cheap)
 
 
@@ -154,11 +157,11 @@ def first_interval(
     candidates: Candidates,
     four: FreeTime,
     branch: int,
-    cell: tuple[int, int, float],
-    pruned: bool,
+    cell: tuple[int, int, float, bool],
+    known: ClosedForm,
 ) -> bool:
     """Put a cell of a branch onto the stack; False where there is nothing to look for."""
-    room, (j, nodes, reach) = candidates.nodes, cell
+    room, (j, nodes, reach, pruned) = candidates.nodes, cell
     values, low, high, numbers = (
         room.values[branch],
         room.stack[0, 0],
@@ -179,7 +182,7 @@ def first_interval(
     if not (at_low and at_high):  # both branches end in between, where they meet
         if math.isnan(room.ends[j]):
             between = reach * here / nodes, reach * beyond / nodes
-            room.ends[j] = end_of_branches(problem, candidates, four, between, branch)
+            room.ends[j] = end_of_branches(problem, candidates, four, between, branch, known)
         edge = high if beyond > here else low
         edge[:] = 0.0
         edge[four.q] = room.ends[j]
@@ -209,11 +212,25 @@ def end_of_branches(
     four: FreeTime,
     between: tuple[float, float],
     branch: int,
+    known: ClosedForm,
 ) -> float:
     """How far both branches go from a free time with solutions towards one without."""
     good, beyond = between
     times = candidates.nodes.work[0]
-    for _ in range(30):
+    # Where they end in the plane takes no angle. The times on either side of that are looked at.
+    for _ in range(HALVED):
+        middle = 0.5 * (good + beyond)
+        if is_solved(known, middle):
+            good = middle
+        else:
+            beyond = middle
+    times[four.q] = good
+    if good == between[0] or not math.isnan(evaluate(problem, candidates, four, times, branch)):
+        times[four.q] = beyond
+        if beyond == between[1] or math.isnan(evaluate(problem, candidates, four, times, branch)):
+            return good
+    good, beyond = between
+    for _ in range(HALVED):
         times[four.q] = 0.5 * (good + beyond)
         if math.isnan(evaluate(problem, candidates, four, times, branch)):
             beyond = times[four.q]

@@ -40,6 +40,7 @@ from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 
 SAME_PRICE = 1e-9  # relative: chains of transitions of one price are one
+ROUNDED = 1e-6  # relative, of times: by less than that they change where they are refined
 NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding
 
 
@@ -128,12 +129,15 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
         most += math.floor(time_left(problem) * fastest / full)
     # Without other conditions each trim is the only one of its subgroup, and goes on in time.
     alone_1, alone_2 = m == 0, m == 0 and rank == 2
+    pace_1, pace_2 = w_1 if w_1 != 0.0 else 1.0, w_2 if w_2 != 0.0 else 1.0
     most_1, most_2 = most if w_1 != 0.0 else 0, most if w_2 != 0.0 else 0
     for turns_1 in range(-most_1, most_1 + 1):
-        if alone_1 and (block_1 + full * turns_1) * (w_1 if w_1 != 0.0 else 1.0) < 0.0:
+        time_1 = (block_1 + full * turns_1) / pace_1
+        if alone_1 and not 0.0 <= time_1 <= longest_time(problem, word[begin], 0.0):
             continue
         for turns_2 in range(-most_2, most_2 + 1):
-            if alone_2 and (block_2 + full * turns_2) * (w_2 if w_2 != 0.0 else 1.0) < 0.0:
+            time_2 = (block_2 + full * turns_2) / pace_2
+            if alone_2 and not 0.0 <= time_2 <= longest_time(problem, second, time_1):
                 continue
             matrix, rhs = with_conditions(problem, word, n, rank)
             rhs[0] = block_1 + full * turns_1
@@ -148,6 +152,16 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
             times, found_rank = least_squares(matrix, rhs, 1e-11)
             if found_rank == n and times.min() > 1e-9:
                 propose(problem, candidates, word, n, times)
+
+
+@bare_inner_kernel
+def longest_time(problem: WordProblem, trim: int, before: float) -> float:
+    """How long a trim may last in a solution, after others of so long: no other is recorded."""
+    longest: float = problem.trims.periods[trim] if problem.terms.more_turns == 0 else np.inf
+    longest *= 1.0 + ROUNDED
+    if problem.trims.weights[trim] > 0.0:
+        longest = min(longest, time_left(problem) * (1.0 + ROUNDED) - before)
+    return longest
 
 
 @inner_kernel
@@ -446,7 +460,7 @@ def scan_all_words(
     portions: IntArray,
     most: int,
     tie: float,
-    not_first: int,
+    left_out: IntArray,
 ) -> None:
     """Scan and polish all words of up to `most` trims, at most four with the free turn.
 
@@ -456,9 +470,10 @@ def scan_all_words(
     In one or two ways to meet the time, each with its greatest number of moving trims, 0 for a way
     that is none, and with a lower bound of what its words cost. Shorter words come first;
     `portions` says how many words, of three trims and of four, are scanned before the solutions of
-    some lower the upper bound of the others. Where `not_first` is a trim, only words of the first
-    way's most moving trims that do not begin with it are scanned, and longer ones.
+    some lower the upper bound of the others. Where `left_out` (1,) is a trim, only words of the
+    first way's most moving trims that do not begin with it are scanned, and longer ones.
     """
+    not_first = left_out[0]
     for n in range(1 if not_first < 0 else most_moving[0], most + 1):
         if n <= most_moving[0] and not at_least[0] > tied_to_best(found, tie):
             scan_mode(one, links_of_one, candidates, found, n, tail, portions, most, tie, not_first)

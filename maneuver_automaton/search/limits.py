@@ -166,11 +166,12 @@ def sole_bound(problem: Problem, goal: Goal, off: tuple[float, float]) -> float:
 
 def busy_bound(problem: Problem, at_rest: float) -> float:
     """Cost of plans that rest less than `at_rest` [s] of a fixed time, at least; inf if free."""
-    library, limit = moving_trims(problem.automaton, problem.cost), problem.horizon.time
-    prices = _prices(library, True)
-    if limit is None or library.rest is None or library.rest_rate or prices is None:
-        return math.inf if limit is None else 0.0
-    return prices.per_second * (limit - at_rest)
+    limit = problem.horizon.time
+    if limit is None:
+        return math.inf
+    library = moving_trims(problem.automaton, problem.cost)
+    prices = None if library.rest is None or library.rest_rate else _prices(library, True)
+    return 0.0 if prices is None else prices.per_second * (limit - at_rest)
 
 
 def three_are_enough(problem: Problem) -> bool:

@@ -10,13 +10,13 @@ import itertools
 import math
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import called_again
+from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import terms_of
@@ -64,8 +64,7 @@ class Mode:
     seconds: float  # that a whole scan may take; inf where words are too long for one
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extent:
+class Extent(NamedTuple):
     """Which words a scan looks at, and how closely."""
 
     most: int  # trims
@@ -95,7 +94,8 @@ class WordScan:
         self.limit = math.inf if limit is None else limit  # [s]
         self.idle: list[WordScan] = []  # where it is put once its results are read
         self.upper_bound = math.inf
-        self.goal, self.fixed = np.empty(4), np.zeros(9)  # of all modes
+        self.ends = np.zeros(13)
+        self.goal, self.fixed = self.ends[:4], self.ends[4:]  # of all modes
         self.reaches = np.minimum(self.tables.turns, self.limit)
         self.modes = tuple(self._modes())
         self._make_room(CAPACITY)
@@ -106,13 +106,12 @@ class WordScan:
     ) -> None:
         """Begin with another goal, in the memory of the last scan."""
         self.setup = setup
-        self.not_first = -1 if not_first is None else int(self.tables.columns.number_of[not_first])
+        left_out = -1 if not_first is None else self.tables.columns.number_of[not_first]
         self.pruned = self.asked is not None or upper_bound < math.inf
         self.upper_bound = upper_bound
-        self.goal[:] = setup.goal
         x, y, heading, rise = setup.goal.tolist()
         distance, turn = math.hypot(x, y), abs(math.remainder(heading, FULL_TURN))
-        self.fixed[:] = 0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y
+        self.ends[:] = x, y, heading, rise, 0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y
         # longest time of interest: a full turn, or a path well beyond the goal
         length = max(2.0 * (distance + 4.0 * self.tables.largest) + abs(rise), 1e-3)
         straight = length / self.tables.fastest
@@ -122,19 +121,18 @@ class WordScan:
                 mode.kernel_problem[0].library.targets[0] = rise
         if len(self.found.costs) > CAPACITY:
             self._make_room(CAPACITY)
-        self.candidates.counter[:] = 0
-        self.found.counter[0] = 0
+        self.counters[:] = 0, 0, 0, 0, left_out
         self.found.best[:] = upper_bound
 
     def _make_room(self, capacity: int) -> None:
         """Make room for so many solutions."""
-        width = MOST_TRIMS + 1
+        width, self.counters = MOST_TRIMS + 1, np.zeros(5, dtype=np.int64)
         self.candidates = Candidates(
             words=np.empty((CAPACITY, width), dtype=np.int64),
             times=np.empty((CAPACITY, width)),
             sizes=np.empty(CAPACITY, dtype=np.int64),
             isolated=np.empty(CAPACITY, dtype=np.int64),
-            counter=np.zeros(3, dtype=np.int64),
+            counter=self.counters[:3],
             turns=np.zeros((3, width), dtype=np.int64),
             work=np.zeros(width),
             nodes=_room(self.nodes),
@@ -143,10 +141,10 @@ class WordScan:
             words=np.empty((capacity + 1, width), dtype=np.int64),
             times=np.empty((capacity + 1, width)),
             costs=np.empty(capacity),
-            counter=np.zeros(1, dtype=np.int64),
+            counter=self.counters[3:4],
             best=np.full(self.asked or capacity, self.upper_bound),
         )
-        self.calls: dict[int, tuple[Any, ...]] = {}  # arguments, by the number of modes at once
+        self.calls: dict[int, Callable[[], None]] = {}  # by the number of modes at once
 
     @property
     def n_found(self) -> int:
@@ -168,7 +166,8 @@ class WordScan:
 
         Where there is no room for all solutions they are scanned again, if there is time.
         """
-        modes = [one for one in self.modes if one.at_least <= tied(float(self.found.best[-1]))]
+        upper_bound = tied(float(self.found.best[-1]))
+        modes = [one for one in self.modes if one.at_least <= upper_bound]
         tail = 1 if self.setup.free_heading else 0
         if max_words is None:
             moment = min(MOMENT, AT_ONCE * budget.left)  # in which nobody asks the clock
@@ -176,7 +175,7 @@ class WordScan:
             modes = [mode for mode in modes if mode not in at_once]
             if at_once:  # in one call: calls take longer than a scan of few words
                 self._scan_at_once(at_once, tail)
-        finished = all(
+        finished = not modes or all(
             self._scan_all(flat, chunk, mode, n, budget, max_words)
             for n in range(1, self.most + 1)
             for mode in modes
@@ -192,13 +191,11 @@ class WordScan:
 
     def _scan_at_once(self, modes: list[Mode], tail: int) -> None:
         """Scan all words of one or two modes, whose arrays stay what they are at every call."""
-        scan: Callable[..., None] = _kernels_words.scan_all_words
-        if len(modes) in self.calls:
-            scan = called_again(scan)
-        else:
+        if len(modes) not in self.calls:
             both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
             limits = [min(mode.most_moving, self.most) for mode in modes]
-            self.calls[len(modes)] = (
+            self.calls[len(modes)] = bound(
+                _kernels_words.scan_all_words,
                 *both[0].kernel_problem,
                 *both[1].kernel_problem,
                 np.array([*limits, 0][:2]),
@@ -209,8 +206,9 @@ class WordScan:
                 PORTIONS_AT_ONCE,
                 self.most,
                 TIE,
+                self.counters[4:],
             )
-        scan(*self.calls[len(modes)], self.not_first)
+        self.calls[len(modes)]()
 
     def _scan_all(
         self, flat: bool, chunk: int, mode: Mode, n: int, budget: Budget, max_words: int | None
