@@ -418,6 +418,7 @@ def test_start_equal_to_goal():
         ("on side left on", (2.0, 0.5, math.pi, 1.0)),
         ("left spin right", (2.0, math.pi, 1.0)),  # along one circle
         ("right spin right", (1.5, math.pi, 1.0)),  # where two circles touch
+        ("side spin left spin", (0.2, 0.1, math.pi, 0.5)),
     ],
 )
 def test_words_that_turn_back_take_a_given_time(names, times):
