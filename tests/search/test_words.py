@@ -415,9 +415,9 @@ def test_start_equal_to_goal():
     [
         ("on left on", (2.0, math.pi, 1.0)),  # along one line, there and back
         ("on right slow", (2.0, math.pi, 1.0)),
-        ("on side left on", (2.0, 0.5, math.pi, 1.0)),
+        ("side on left on", (0.5, 2.0, math.pi, 1.0)),
         ("left spin right", (2.0, math.pi, 1.0)),  # along one circle
-        ("right spin right", (1.5, math.pi, 1.0)),  # where two circles touch
+        ("right spin right", (1.5 * math.pi, math.pi, 2.0)),  # where two circles touch
         ("side spin left spin", (0.2, 0.1, math.pi, 0.5)),
     ],
 )
