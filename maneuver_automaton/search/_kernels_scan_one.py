@@ -44,6 +44,7 @@ from maneuver_automaton.search._kernels_triple import (
 )
 from maneuver_automaton.words._kernels_times import assign
 
+NEARLY = 1e-4  # [m, s] a linear condition is met where branches end
 NOTHING = 1e-7  # [s] that only rounding leaves of a time: arc cosines lose half of the digits
 LEAST_NODES = 8
 HALVED = 30  # times, of a cell in which branches end
@@ -187,6 +188,12 @@ def first_interval(
         edge[:] = 0.0
         edge[four.q] = room.ends[j]
         numbers[beyond - j] = evaluate(problem, candidates, four, edge, branch)
+        if problem.library.targets.size > 0:  # they may meet in a solution: then no sign changes
+            span = room.span[: problem.library.targets.size]
+            for r in range(len(span)):
+                span[r, 0] = condition(problem, four.word, four.n, r, edge) - NEARLY
+                span[r, 1] = span[r, 0] + 2.0 * NEARLY
+            levels(problem, candidates, four.word, four.n, edge, edge, edge, span)
     if pruned:
         # A trim that lasts no time at both ends and halfway lasts none in between, as the branch is
         # analytic: what there is to find is a shorter word, and the gradient nothing but rounding.

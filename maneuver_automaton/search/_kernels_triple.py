@@ -30,8 +30,8 @@ from maneuver_automaton.words._kernels_times import end_and_columns
 def choose_triple(problem: WordProblem, word: IntArray, n: int, triple: IntArray) -> bool:
     """Fill `triple` with the positions solved in closed form, the last to fit; False if none."""
     # Parallel neighbours cannot both be solved for, nor three straights. Two straights have a pole
-    # where they are parallel, so one is solved for if possible.
-    for straights in range(1, 3):
+    # where they are parallel, so one is solved for if possible, or two without a turn in between.
+    for straights in range(1, 4):
         for k in range(n - 1, 1, -1):
             for j in range(k - 1, 0, -1):
                 if j == k - 1 and problem.trims.parallel[word[j], word[k]]:
@@ -43,7 +43,8 @@ def choose_triple(problem: WordProblem, word: IntArray, n: int, triple: IntArray
                     for position in (i, j, k):
                         if is_straight(problem, word[position]):
                             count += 1
-                    if count <= straights:
+                    apart = count == 2 and not is_straight(problem, word[j])
+                    if count < 3 and count + apart <= straights:
                         triple[0], triple[1], triple[2] = i, j, k
                         return True
     return False

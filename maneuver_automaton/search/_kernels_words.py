@@ -12,6 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, shared_kernel
+from maneuver_automaton.groups._kernels import coast
 from maneuver_automaton.search._kernels_polish import polish_all
 from maneuver_automaton.search._kernels_problem import (
     COST,
@@ -22,6 +23,8 @@ from maneuver_automaton.search._kernels_problem import (
     Links,
     WordProblem,
     condition,
+    conjugate,
+    is_parallel,
     is_straight,
     look,
     look_ahead,
@@ -41,6 +44,7 @@ from maneuver_automaton.words._kernels_times import least_squares
 
 SAME_PRICE = 1e-9  # relative: chains of transitions of one price are one
 ROUNDED = 1e-6  # relative, of times: by less than that they change where they are refined
+NEARLY = 1e-5  # [m, s] a linear condition is met: where circles touch, half of the digits are lost
 NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding
 
 
@@ -76,8 +80,8 @@ def closed_form_words(
             cost += problem.library.rates[word[i]] * times[i]
         if admissible and cost < upper_bound:
             for r in range(problem.library.targets.size):
-                span[r, 0] = condition(problem, word, n, r, times) - 1e-9
-                span[r, 1] = span[r, 0] + 2e-9
+                span[r, 0] = condition(problem, word, n, r, times) - NEARLY
+                span[r, 1] = span[r, 0] + 2.0 * NEARLY
             levels(problem, candidates, word, n, times, times, times, span)
 
 
@@ -85,12 +89,13 @@ def closed_form_words(
 def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, n: int) -> None:
     """Words that cannot reach every pose: one or two subgroups, or straights only."""
     # The goal must lie where they can go. What each subgroup contributes follows in closed form;
-    # the times are then the solution of a square linear system.
+    # the times are then the solution of a square linear system. The second subgroup may lead back
+    # to the line, or circle, of the first: as a U-turn does, after which this one goes on.
     twists, m = problem.library.twists, problem.library.targets.size
     straight = True
-    # Positions of the first trim of either subgroup; n: no trim is of it. One that only climbs or
-    # rests is of none: it would be taken for parallel to any.
-    begin, split = n, n
+    # Positions of the first trim of either subgroup, and after both; n: no trim is of it. One that
+    # only climbs or rests is of none: it would be taken for parallel to any.
+    begin, split, back = n, n, n
     for i in range(n):
         straight = straight and is_straight(problem, word[i])
         if not moves_in_plane(twists[word[i]]):
@@ -99,6 +104,8 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
             begin = i
         elif split == n and not problem.trims.parallel[word[begin], word[i]]:
             split = i
+        elif split < n and back == n and not problem.trims.parallel[word[split], word[i]]:
+            back = i
     rank = (begin < n) + (split < n)
     if n > rank + m:
         return
@@ -117,10 +124,20 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
             propose(problem, candidates, word, n, times)
         return
     second = word[split] if rank == 2 else -1
-    block_1, block_2 = blocks_of(problem, word[begin], second)
     w_1, w_2 = twists[word[begin], 2], twists[second, 2] if rank == 2 else 0.0
+    if w_1 == 0.0 and w_2 == 0.0:
+        return
+    block_1, block_2 = blocks_of(problem, word[begin], second)
     block_1 -= full * round(block_1 / full) if w_1 != 0.0 else 0.0
     block_2 -= full * round(block_2 / full) if w_2 != 0.0 else 0.0
+    motions = twists[word[:n]]  # those that come back as seen from before the second subgroup
+    if back < n:
+        time = block_2 / w_2 if w_2 != 0.0 else block_2
+        x, y, turn = coast(twists[second, 0], twists[second, 1], w_2, time)
+        for i in range(back, n):
+            conjugate(motions[i], x, y, turn)
+            if not is_parallel(motions[i], motions[begin]):
+                return
     fastest = 0.0
     for i in range(n):
         fastest = max(fastest, abs(twists[word[i], 2]))
@@ -144,11 +161,12 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
             if rank == 2:
                 rhs[1] = block_2 + full * turns_2
             for i in range(n):
-                twist, head = twists[word[i]], twists[word[begin] if i < split else second]
+                row = 1 if split <= i < back else 0
+                twist, head = motions[i], motions[split if row == 1 else begin]
                 pace = twist[2]
                 if head[2] == 0.0:
                     pace = (twist[0] * head[0] + twist[1] * head[1]) / (head[0] ** 2 + head[1] ** 2)
-                matrix[0 if i < split else 1, i] = pace
+                matrix[row, i] = pace
             times, found_rank = least_squares(matrix, rhs, 1e-11)
             if found_rank == n and times.min() > 1e-9:
                 propose(problem, candidates, word, n, times)
@@ -317,7 +335,7 @@ def propose_words(
             look(problem, links, seen, word, n, rows)
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
         if flat:
-            if spans == 1:
+            if spans > 0:
                 low_rank_word(seen, candidates, rows, n)
         elif spans == 2 and n == 3:
             closed_form_words(seen, candidates, rows, n, triple, room, upper_bound)

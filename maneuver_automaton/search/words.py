@@ -16,7 +16,6 @@ from maneuver_automaton.words.word import Word
 
 MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
 SEED_NODES = 24  # per scanned time, where a rough answer will do
-PARALLEL = 1e-6  # [rad] between straights, or of a turn: of so little none is sure
 
 
 def search_words(
@@ -100,7 +99,7 @@ def search_words(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
     job.idle.append(job)
-    exhaustive = finished and most <= longest and not _may_fold(problem, setup)  # no word is missed
+    exhaustive = finished and most <= longest  # no words of more moving trims are admitted
     none = SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET
     return SearchResult(
         status=SearchStatus.FOUND if solutions else none,
@@ -109,20 +108,6 @@ def search_words(
         exhaustive=exhaustive and problem.horizon.max_trims is not None,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
-
-
-def _may_fold(problem: Problem, setup: SearchSetup) -> bool:
-    """Whether words may drive along one line twice, as in a U-turn, and time is limited."""
-    # Steering knows the one of least times alone. There and back, less costs less, too.
-    turn = math.remainder(float(setup.goal[2]), 2.0 * math.pi)
-    horizon, twists = problem.horizon, setup.library.twists
-    if not (horizon.time or horizon.max_time) or setup.free_heading or abs(turn) < PARALLEL:
-        return False
-    v_x, v_y = twists[(twists[:, 2] == 0.0) & twists[:, :2].any(axis=1), :2].T
-    angles = np.arctan2(v_y, v_x)
-    off = angles[:, None] - angles - turn
-    ends = horizon.time is not None and setup.library.rest is None
-    return bool(((np.abs(np.sin(off)) < PARALLEL) & (ends | (np.cos(off) > 0.0))).any())
 
 
 def most_admitted(*, free_heading: bool, fixed: bool) -> int:

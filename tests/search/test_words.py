@@ -12,7 +12,7 @@ import pytest
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import Unicycle, UserModel
+from maneuver_automaton.models import Omnidirectional, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.words import search_words
@@ -410,12 +410,29 @@ def test_start_equal_to_goal():
     assert best(whole_turn).trims.size == 0
 
 
-@pytest.mark.parametrize("most", [3, 4])
-def test_of_a_u_turn_in_a_fixed_time_nothing_is_proven(most):
-    robot = Automaton.of_controls(Unicycle(), {"on": (1, 0), "left": (1, 1), "right": (1, -1)})
-    known = Plan(np.zeros(3), [robot[n] for n in ("on", "left", "on")], durations=[2, math.pi, 1])
-    horizon = Horizon(time=known.duration, max_trims=most)
+@pytest.mark.parametrize(
+    ("names", "times"),
+    [
+        ("on left on", (2.0, math.pi, 1.0)),  # along one line, there and back
+        ("on right slow", (2.0, math.pi, 1.0)),
+        ("side on left on", (0.5, 2.0, math.pi, 1.0)),
+        ("left spin right", (2.0, math.pi, 1.0)),  # along one circle
+        ("right spin right", (1.5 * math.pi, math.pi, 2.0)),  # where two circles touch
+        ("side spin left spin", (0.2, 0.1, math.pi, 0.5)),
+    ],
+)
+def test_words_that_turn_back_take_a_given_time(names, times):
+    controls = {"on": (1, 0, 0), "slow": (0.5, 0, 0), "side": (0, 1, 0), "spin": (0, 0, 1)}
+    controls |= {"left": (1, 0, 1), "right": (1, 0, -1)}
+    robot = Automaton.of_controls(Omnidirectional(), {n: controls[n] for n in names.split()})
+    known = Plan(np.zeros(3), [robot[n] for n in names.split()], durations=times)
+    horizon = Horizon(time=known.duration, max_trims=len(times))
     problem = Problem(robot, np.zeros(3), known.end, horizon=horizon, cost=Cost(effort=1.0))
-    found = search_words(problem, problem.goals[0])
-    assert not found.solutions or found.solutions[0].cost > problem.cost_of(known)
-    assert not found.exhaustive
+    found = search_words(problem, problem.goals[0], alternatives=None)
+    listed = [
+        one.durations
+        for one in found.solutions
+        if [robot.trim_names[k] for k in one.trims] == names.split()
+    ]
+    assert found.exhaustive
+    assert any(np.allclose(durations, times) for durations in listed)
