@@ -508,9 +508,8 @@ class Problem:
 
     def _trim_or_rest(self, name: str | None) -> Trim:
         """A trim by its name, or rest; any trim where there is no rest and it is left at will."""
-        if name is not None:
-            return self.automaton[name]
-        return self.automaton.trims[self.automaton.rest or 0]
+        known = self.automaton
+        return known.trims[known.rest or 0] if name is None else known[name]
 
     @property
     def rates(self) -> Array:
@@ -552,9 +551,8 @@ class Problem:
 
         def prices() -> tuple[place_prices.PlacePrice, ...]:
             model, beside = self.automaton.model, self.invariant_cost_of(plan)
-            costs = self.bound_place_costs
             price = functools.partial(place_prices.price_along, beside=beside)
-            return tuple(price(cost, plan, model) for cost in costs)
+            return tuple(price(cost, plan, model) for cost in self.bound_place_costs)
 
         return kept_with(plan, self.bound_place_costs, prices)
 
@@ -773,8 +771,10 @@ class Problem:
 
     @property
     def rests_at_both_ends(self) -> bool:
-        """Whether the vehicle starts and ends at rest."""
-        return self.first_trim.is_rest and all(self.last_trim(goal).is_rest for goal in self.goals)
+        """Whether the vehicle starts and ends at rest, or in states that are no others."""
+        rests = [one.reduced_state.tolist() for one in self.automaton.trims if one.is_rest]
+        ends = [self.first_trim, *map(self.last_trim, self.goals)]
+        return all(one.is_rest or one.reduced_state.tolist() in rests for one in ends)
 
     @functools.cached_property
     def quiet_after(self) -> float:

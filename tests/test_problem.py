@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from maneuver_automaton import load_stock_library
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import UnknownTrim
@@ -370,3 +371,17 @@ def test_every_parameter_is_documented():
 def test_nothing_is_no_setting(name):
     with pytest.raises(ValueError, match=rf"^{name}: got None, need \w+\(\.\.\.\)$"):
         problem(**{name: None})
+
+
+@pytest.mark.parametrize(
+    ("name", "moving", "same"),
+    [
+        ("car_with_trailer", "speed 3, hitch 0", True),  # its speed is no state
+        ("second_order_car", "speed 2.5, steering 0", False),
+    ],
+)
+def test_a_moving_trim_in_the_state_of_rest_is_like_rest(name, moving, same):
+    library = load_stock_library(name)
+    there = Problem(library, [0, 0, 0], Goal([9, 1, 0], trim=moving), start_trim=moving)
+    assert Problem(library, [0, 0, 0], [9, 1, 0]).rests_at_both_ends
+    assert there.rests_at_both_ends == same

@@ -10,6 +10,7 @@ from maneuver_automaton.groups import group_of
 from tests.matrix import outside
 from tests.matrix.measuring import (
     SAMPLED,
+    TIME_LIMIT,
     close,
     cost_of,
     found,
@@ -36,7 +37,6 @@ SCENES = {  # how many of each vehicle
 }
 BRIEF = {"unicycle"}  # slow; the others are exhaustive too
 WORK = SearchSettings(max_expansions=600)
-TIME_LIMIT = 600.0  # [s] 20 of processor time are needed at most
 
 
 def drawn(vehicle, seed):

@@ -17,13 +17,22 @@ from maneuver_automaton.formats.closed_loop_json import load_steps, save_closed_
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, simulate
 from tests.matrix import outside
-from tests.matrix.measuring import EXACT, SAME, SAMPLED, Costlier, Nothing, close, found, obeys
+from tests.matrix.measuring import (
+    EXACT,
+    SAME,
+    SAMPLED,
+    TIME_LIMIT,
+    Costlier,
+    Nothing,
+    close,
+    found,
+    obeys,
+)
 from tests.matrix.outside import Course
 from tests.matrix.rows import Engine, feature, without
 from tests.matrix.scenes import base, crossing, fixed_duration, midway, pillar, slow_speed
 from tests.matrix.vehicles import Vehicle
 
-LOOP_LIMIT = 3.0  # [s] of one step of a closed loop
 STEPS = 60  # of a closed loop, at most
 
 
@@ -35,7 +44,7 @@ def driven(
     loop = engine.simulate(
         problem,
         step=_step(vehicle),
-        **({"steps": STEPS, "time_limit": LOOP_LIMIT} | (options or {})),
+        **({"steps": STEPS, "time_limit": TIME_LIMIT} | (options or {})),
     )
     _driven_well(vehicle, problem, loop, noisy="disturbance" in (options or {}))
     return loop
@@ -136,7 +145,7 @@ def _forgetful(*arguments: Any) -> Any:
 def _resumed(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     """Stopped after three steps and taken up from its file, a loop goes on as if it never was."""
     problem = vehicle.problem(**changes)
-    options = {"step": _step(vehicle), "time_limit": LOOP_LIMIT}
+    options = {"step": _step(vehicle), "time_limit": TIME_LIMIT}
     begun = engine.simulate(problem, steps=3, **options)
     if len(begun.steps) < 3:
         raise Nothing(begun.reason)
