@@ -53,6 +53,14 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     return None
 
 
+def blocked_anyway(problem: Problem) -> PlanResult | None:
+    """The verdict of `blocked_ends` where it holds for all ends within the tolerances too."""
+    loose = any(goal.tolerance_m > 0.0 or goal.tolerance_rad > 0.0 for goal in problem.goals)
+    blocked = blocked_ends(problem)
+    open_end = loose and blocked is not None and blocked.status is PlanStatus.GOAL_BLOCKED
+    return None if open_end else blocked
+
+
 def proven_free(problem: Problem, poses: Array) -> list[bool]:
     """Whether the kernels prove poses in the plane free of all that stands, all in one call."""
     world = scene.world_around(problem)

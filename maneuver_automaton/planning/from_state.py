@@ -19,7 +19,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.blocked import blocked_anyway
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.polishing import Polish, why_not_polished
@@ -83,7 +83,7 @@ class FromState(PlanningStep):
         """Offer the answers with their maneuvers, then all of it polished."""
         problem, budget, ended = found.problem, found.budget, found.ended
         ended.is_complete = True
-        ended.verdict = blocked_ends(problem)
+        ended.verdict = blocked_anyway(problem)
         if ended.verdict is not None:
             return
         questions, refused = _questions(found)
@@ -180,14 +180,13 @@ def _question(
     took = 0.0 if first is None else first.maneuver.duration
     least_after = min(0.0 if leg is None else leg.maneuver.duration for leg in last)
     most_after = max(0.0 if leg is None else leg.maneuver.duration for leg in last)
-    if horizon.time is not None:
-        if len(goals) > 1 and most_after > least_after:
-            return None  # each needs another time: they are asked for one by one
-        horizon = replace(horizon, time=horizon.time - took - most_after)
-    elif horizon.max_time is not None:
-        horizon = replace(horizon, max_time=horizon.max_time - took - least_after)
-    if (horizon.time or horizon.max_time or 1.0) <= CLOCK:
-        return None
+    if horizon.time is not None and len(goals) > 1 and most_after > least_after:
+        return None  # each needs another time: they are asked for one by one
+    if (limit := horizon.time or horizon.max_time) is not None:
+        left = limit - took - (least_after if horizon.time is None else most_after)
+        if left <= CLOCK:
+            return None
+        horizon = replace(horizon, time=horizon.time and left, max_time=horizon.max_time and left)
     pose = problem.start
     if first is not None:
         group = group_of(pose.size)

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
+from maneuver_automaton.planning.blocked import blocked_anyway, goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Problem, moves
@@ -57,10 +57,9 @@ class OnStateLattice(PlanningStep):
     def offer(self, found: Incumbents) -> None:
         """Offer the cheapest path of the graph."""
         problem, budget, ended = found.problem, found.budget, found.ended
-        blocked = blocked_ends(problem)
-        open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
-        if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
-            ended.verdict, ended.is_complete = blocked, True
+        ended.verdict = blocked_anyway(problem)
+        ended.is_complete = ended.verdict is not None
+        if ended.is_complete:
             return
         goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
         if not goals:

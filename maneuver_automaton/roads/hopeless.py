@@ -93,7 +93,7 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
         return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
     away = goal.away_from(shapely.Point(start.middle[:2]))
     fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
-    if away > (most := fastest * lasts):
+    if away > (most := _reach(vehicle, fastest * lasts)):
         return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
     if slowest >= 0.0 and (behind := _behind(goal, start.middle, road, vehicle, most)):
         return behind
@@ -102,6 +102,14 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
         if not _may_fit(goal.places, goal.heading, shapely.buffer(area, PROVEN), vehicle):
             return "at none of its headings is the road there wide enough for the body"
     return ""
+
+
+def _reach(vehicle: RoadVehicle, way: float) -> float:
+    """How far the middle of a vehicle gets at most while its rear axle drives a way [m]."""
+    # Turning into a direction, and backwards out of it, it gains by its place and loses by arcs.
+    tightest, ahead = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering), vehicle.ahead
+    gained = 4.0 * abs(ahead - tightest * math.atan(ahead / tightest))
+    return way + min((math.hypot(1.0, ahead / tightest) - 1.0) * way, gained)
 
 
 def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, most: float) -> str:
@@ -216,7 +224,8 @@ def _met(
     top = float(np.abs(vehicle.model.reduced_limits[0]).max())
     places, met = shapely.Point(scene.start.middle[:2]), [False for _ in scene.goals]
     for low, high in itertools.pairwise([*times, last]):
-        around = shapely.buffer(places, TOUCHES + WIDER * min(top * (high - low), FAR))
+        most = min(_reach(vehicle, top * (high - low)), FAR)
+        around = shapely.buffer(places, TOUCHES + WIDER * most)
         left = shapely.intersection(road, around)
         there = [wall for wall, since, until in every if since <= low and high <= until]
         parts = shapely.get_parts(shapely.difference(left, united(there)) if there else left)

@@ -148,6 +148,23 @@ def test_a_first_maneuver_that_hits_is_no_plan() -> None:
     assert result.reason.startswith("no first maneuver")
 
 
+def test_a_goal_that_is_blocked_is_met_within_its_tolerance() -> None:
+    end = np.array([20.0, 6.0, 0.0])
+    at_goal = ma.Disc(0.2, [22.15, 6.0])  # 5 cm within its front
+    problem = problem_of("second_order_car", obstacles=at_goal)
+    near = replace(problem, goals=(ma.Goal(end, tolerance_m=0.5),))
+    assert ma.plan(near, time_limit=10.0).plan is not None
+    assert ma.plan(problem, time_limit=10.0).status is ma.PlanStatus.GOAL_BLOCKED
+
+
+@pytest.mark.parametrize("horizon", [{"time": 0.1}, {"max_time": 0.1}])
+def test_less_time_than_the_first_maneuver_takes_is_told(horizon: dict) -> None:
+    end = ma.Goal([0.12, 0.0, 0.0], state=[1.4, 0.1])
+    here = problem_of("second_order_car", horizon=ma.Horizon(**horizon), obstacles=())
+    result = ma.plan(replace(here, goals=(end,)), time_limit=2.0)
+    assert result.reason == "the first and the last maneuver take longer than the horizon admits"
+
+
 def test_a_fleet_starts_in_the_states_of_its_vehicles() -> None:
     library, body = ma.load_stock_library("second_order_car"), ma.Box([4.0, 1.8])
     ways = ([0.0, 0.0, 0.0], [20.0, 3.0, 0.0]), ([20.0, -4.0, np.pi], [0.0, -6.0, np.pi])

@@ -16,12 +16,15 @@ from maneuver_automaton.roads import (
     RoadPlanner,
     RoadScene,
     RoadStart,
+    RoadVehicle,
     drive_road,
     drive_scene,
     driving,
+    judged,
     plan_road,
     road_planner,
 )
+from maneuver_automaton.roads.plans import plan_of_controls
 from tests.formats.outside import DATA, needs_data
 from tests.quickly import quick_are
 from tests.roads.files import (
@@ -164,7 +167,7 @@ def test_late_goals_are_found(tmp_path):
             {},
             goal(place(190.0, 2.0, 8.0), time=(0, 20)),
             "missed",
-            "no goal can be reached: it is 176 m away, and until it is over one drives 40 m at",
+            "no goal can be reached: it is 176 m away, and until it is over one drives 41.2 m",
         ),
     ],
 )
@@ -345,6 +348,24 @@ def test_a_turn_that_is_too_tight_is_named(radius, told):
     assert said.startswith("; the right turn on lanelet 2 leaves 2.") if told else said == ""
     result = plan_road(scene, time_limit=0.1 if told else LIMIT)
     assert result.reason.endswith(said) if told else result.plan is not None
+
+
+def test_the_middle_of_who_turns_gets_further_than_the_rear_axle():
+    car = RoadVehicle()
+    turning = np.array([*car.rear_of([0.0, 0.0, 0.0]), 2.0, car.model.max_steering])
+    way = plan_of_controls(car.model, turning, np.array([[8.0, 0.0]] * 2), tick=0.1)
+    scene = RoadScene(
+        name="turning",
+        lanelets=(Lanelet(1, [[-60, 30], [60, 30]], [[-60, -30], [60, -30]]),),
+        start=RoadStart(
+            middle=[0, 0, 0],
+            speed=2.0,
+            turn_rate=car.model.body_velocity([2.0, turning[4]], [0.0, 0.0])[2],
+        ),
+        goals=(GoalRegion(places=Box([0.01, 0.01], car.middle_of(way.end)[:2]), time=(0.2, 0.2)),),
+    )
+    assert judged(scene, car, way).clean
+    assert road_planner(scene).hopeless() is None
 
 
 def test_a_goal_behind_is_told(tmp_path):
