@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
@@ -27,7 +25,7 @@ WORK = SearchSettings(max_expansions=4000)
 
 
 def counted(expansions):
-    return replace(UNLIMITED, expansions=expansions)
+    return UNLIMITED._replace(expansions=expansions)
 
 
 def posed(goal=(6.0, 0.0, 0.0), *, states=None, **changes):

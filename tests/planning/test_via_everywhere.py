@@ -48,7 +48,7 @@ def test_too_little_time_is_told():
     problem = ma.Problem(ROBOT, START, GOAL, via=PAST, horizon=ma.Horizon(max_time=7.9))
     result = ma.plan(problem, time_limit=60.0)
     assert result.status is ma.PlanStatus.UNREACHABLE
-    assert result.reason.startswith("from pose 1 on the way to the goal")
+    assert result.reason.startswith("from the start to pose 1 on the way")
 
 
 @pytest.mark.slow

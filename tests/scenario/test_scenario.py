@@ -245,7 +245,9 @@ poses = st.tuples(number, number, number)
 @st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
     names = draw(st.lists(st.text(min_size=1).filter(str.strip), min_size=1, unique=True))
-    driven = st.tuples(st.floats(-1e3, 1e3), st.floats(-1.0, 1.0))  # within the limits
+    driven = st.tuples(st.floats(-1e3, 1e3), st.floats(-1.0, 1.0)).filter(  # within the limits
+        lambda control: all(abs(one) > 1e-99 for one in control if one)
+    )
     controls = {name: draw(driven) for name in names}
     robot = Automaton.of_controls(Unicycle(), controls)
     goals = tuple(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement.improve import WordSchedule, words_of
@@ -45,7 +45,7 @@ def search_maneuvers(
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
     search = words_of(
-        query, budget=replace(budget, expansions=max_expansions), schedule=WordSchedule()
+        query, budget=budget._replace(expansions=max_expansions), schedule=WordSchedule()
     )
     for word in search:
         found.append((word, search.expansions, time.monotonic() - begun))

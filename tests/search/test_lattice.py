@@ -180,7 +180,7 @@ def test_nodes_are_ends_of_free_ways(name, resolution, sign):
 def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
     problem = PROBLEMS[name]
     query = query_of(problem)
-    found = first_plan(query, budget=replace(UNLIMITED, expansions=20_000 if COMPILED else 60))
+    found = first_plan(query, budget=UNLIMITED._replace(expansions=20_000 if COMPILED else 60))
     if found.word is None:
         assert not COMPILED
         return
@@ -223,7 +223,7 @@ from maneuver_automaton.budget import UNLIMITED
 from tests.search.test_lattice import PROBLEMS, TIGHT, grown, query_of
 from maneuver_automaton.search.lattice import first_plan
 for name in ("car", "moving", "prices"):
-    found = first_plan(query_of(PROBLEMS[name]), budget=replace(UNLIMITED, expansions=25))
+    found = first_plan(query_of(PROBLEMS[name]), budget=UNLIMITED._replace(expansions=25))
     word = found.word
     print(name, found.expansions, found.queries, *map(float.hex, found.nearest), found.exhausted,
           word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
