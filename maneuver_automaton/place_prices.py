@@ -14,10 +14,10 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups.se2 import after, displacements
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import (
-    Ground,
     PlaceCost,
     allowed,
     gradient_of,
+    jumps_along,
     rates_along,
     scale_of,
     smoothed,
@@ -38,6 +38,7 @@ MOST_INTERVALS = 1 << 16
 MOST_STRETCHES = 1 << 20  # to begin with
 KINKED = 1.0 / 3.0  # of what two rules differ by, that the finer one is off at a kink of a rate
 NODES = np.linspace(0.0, 1.0, 5)
+ASIDE = 0.5  # of second differences of nodes, by which a course is off their chords; 0.13 on an arc
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
 
 
@@ -56,54 +57,46 @@ class _Intervals(NamedTuple):
     begin: Array  # (n,) [s] since the primitive began
     end: Array  # (n,)
 
-    def halved(self, rows: NDArray[np.bool_]) -> _Intervals:
-        """Halves of some of them."""
-        piece, begin, end = self.piece[rows], self.begin[rows], self.end[rows]
-        middle = 0.5 * (begin + end)
-        return _Intervals(
-            np.repeat(piece, 2),
-            np.column_stack([begin, middle]).ravel(),
-            np.column_stack([middle, end]).ravel(),
-        )
-
 
 def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> PlacePrice:
     """The integral of a cost along a plan, to `SHARE` of it and of what the plan costs `beside`.
 
     Simpson's rule over stretches not longer than the finest feature; those whose halves say
-    something else are halved again, until what they differ by in all is small enough. Where a rate
-    jumps, at the border of an area, that finds the border. What has kinks at most is nearer to the
-    finer rule than that by a `KINKED` share: halves are off by a quarter of what the whole is.
+    something else are halved again, until what they differ by in all is small enough, and those
+    which the border of an area comes near, until what a piece over it between nodes costs is. What
+    has kinks at most is off the finer rule by a `KINKED` share of what both rules differ by: halves
+    are off by a quarter of what the whole is.
     """
     motion = _Motion(cost, plan, model)
     sure = KINKED if getattr(cost, "continuous", False) else 1.0
     todo, done, doubt, refused = _first_stretches(plan, scale_of(cost)), 0.0, 0.0, None
-    rates, new = np.empty((len(todo.piece), len(NODES))), slice(None)
-    for _ in range(ROUNDS):
+    seen, new = np.empty((len(todo.piece), len(NODES), 4)), slice(None)
+    for left in reversed(range(ROUNDS)):
         if not len(todo.piece):
             break
         spans = todo.end - todo.begin
         since = todo.begin[:, None] + spans[:, None] * NODES[new]
-        rates[:, new], good = motion.at(todo.piece, since)
+        seen[:, new], good = motion.at(todo.piece, since)
         if refused is None and not good.all():
             row, node = np.argwhere(~good)[0]
             refused = float(plan.switching_times[todo.piece[row]] + since[row, node])
+        rates, paces, lines = seen[..., 0], seen[..., 1], seen[..., 2:]
         fine = spans * (rates @ FINE)
         off = sure * np.abs(fine - spans * (rates @ COARSE))
         most = SHARE * (beside + done + float(fine.sum()))
-        hides = motion.unseen(todo) > most
-        if (doubt + off.sum() <= most and not hides.any()) or len(off) > MOST_INTERVALS:
-            done, doubt = done + float(fine.sum()), doubt + float(off.sum())
-            break
-        split = hides | (off > 0.25 * most / len(off))
+        aside = ASIDE * np.linalg.norm(np.diff(lines, 2, axis=1), axis=2).max(axis=1)
+        hidden = 0.25 * spans * paces.max(axis=1) * jumps_along(cost, lines, aside) > most
+        close = doubt + off.sum() <= most and not hidden.any()
+        split = hidden | (off > 0.25 * most / len(off))
+        split &= not (close or not left or len(off) > MOST_INTERVALS)
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
-        todo, whole = todo.halved(split), rates[split]
-        rates, new = np.empty((len(todo.piece), len(NODES))), slice(1, None, 2)
-        rates[::2, ::2], rates[1::2, ::2] = whole[:, :3], whole[:, 2:]  # every other node is known
-    else:
-        doubt += float(off[split].sum())
-        done += float(fine[split].sum())
+        whole, (piece, begin, end) = seen[split], (one[split] for one in todo)
+        middle = 0.5 * (begin + end)
+        begin, end = np.stack([begin, middle, middle, end], axis=1).reshape(-1, 2).T
+        todo = _Intervals(np.repeat(piece, 2), begin, end)
+        seen, new = np.empty((len(todo.piece), *seen.shape[1:])), slice(1, None, 2)
+        seen[::2, ::2], seen[1::2, ::2] = whole[:, :3], whole[:, 2:]  # every other node is known
     return PlacePrice(done, doubt, refused)
 
 
@@ -178,21 +171,15 @@ class _Motion:
                 self.twists[k], self.states[k] = one.body_velocity, one.reduced_state
 
     def at(self, piece: IntArray, since: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Rates per second (n, k), and where the vehicle may be, in pieces (n,) at times [s]."""
+        """Rates per second, paces, x, y (n, k, 4) at times [s]; where the vehicle may be (n, k)."""
         pieces = np.repeat(piece, since.shape[1])
         poses, twists, states = (
             one.reshape(*since.shape, -1) for one in self.steps(pieces, since.ravel())
         )
-        rates = rates_along(self.cost, poses, twists, states)
-        return rates * self._paces(twists), allowed(self.cost, poses, twists)
-
-    def unseen(self, of: _Intervals) -> Array:
-        """What each may cost (n,) that its nodes do not see: where an area begins and ends."""
-        if not isinstance(self.cost, Ground):
-            return np.zeros(len(of.piece))
-        spans = of.end - of.begin
-        poses, twists, _ = self.steps(of.piece, of.begin + 0.5 * spans)
-        return self.cost.unseen(poses[:, :2], _speeds(twists) * spans, spans)
+        paces = self._paces(twists)
+        rates = paces * rates_along(self.cost, poses, twists, states)
+        seen = np.stack([rates, paces, poses[..., 0], poses[..., 1]], axis=-1)
+        return seen, allowed(self.cost, poses, twists)
 
     def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
         """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""

@@ -7,7 +7,6 @@ integrating them along it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -25,6 +24,7 @@ from maneuver_automaton._arrays import (
     plain_numbers,
 )
 from maneuver_automaton._brief import brief
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
@@ -32,7 +32,8 @@ from maneuver_automaton.collision import AnyObstacle, AnyShape, Box, OccupancyMa
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.motion import planar
-from maneuver_automaton.collision.surroundings import parts_of
+from maneuver_automaton.collision.outline import united
+from maneuver_automaton.collision.surroundings import ShapePart, parts_of
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2, LieGroup
 
@@ -46,12 +47,12 @@ class PlaceCost(Protocol):
     """A cost that sees where the vehicle is: a finite rate of at least 0 at poses.
 
     Rates and `per` are all that it takes. It may also have ``gradient(poses, velocities)``, its
-    derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
-    x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
-    it knows obstacles and body; ``smooth()``, nearly the same without jumps, for better coasting
-    times; ``scale`` [m], the size of its finest feature; ``continuous``, whether rates never jump;
-    and ``allows(poses, velocities)`` (...,), where the vehicle may be at all. What is missing is
-    found by differences, is 0, or is the cost at poses moved back.
+    derivatives (..., dof) by the pose; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the
+    cost once it knows obstacles and body; ``smooth()``, nearly the same without jumps, for better
+    coasting times; ``jumps(lines, aside)``, by how much rates may jump near lines, as `Ground` says
+    it; ``scale`` [m], the size of its finest feature; ``continuous``, whether rates never jump; and
+    ``allows(poses, velocities)`` (...,), where the vehicle may be at all. What is missing is found
+    by differences, is 0, or is the cost at poses moved back.
 
     Examples
     --------
@@ -121,10 +122,6 @@ class Clearance:
     def rates(self, poses: Array, velocities: Array) -> Array:
         """Zero: nothing is near before the cost is bound to a problem."""
         return np.zeros(poses.shape[:-1])
-
-    def least(self, low: ArrayLike, high: ArrayLike) -> float:
-        """Zero, which no rate is below."""
-        return 0.0
 
     def moved(self, by: LieGroup) -> Clearance:
         """The cost itself: obstacles are moved with the problem."""
@@ -211,7 +208,7 @@ class _Near:
         return np.asarray((altitude + low <= height[1]) & (altitude + high >= height[0]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Ground:
     """Ground with a price: areas, or a raster; nothing outside.
 
@@ -351,9 +348,8 @@ class Ground:
         """Size [m] of the finest feature."""
         if self.raster is not None:
             return self.raster.resolution
-        cores = [(part.core, part.radius) for part in parts_of(self.areas)]
-        widths = [2.0 * (r or 2.0 * core.area / core.length) for core, r in cores]
-        return min(SCALE, 0.25 * min(widths))
+        widths = [radius or 2.0 * core.area / core.length for core, radius, *_ in self._parts()]
+        return min(SCALE, 0.5 * min(widths))
 
     @property
     def extent(self) -> tuple[Shape, ...]:
@@ -389,58 +385,58 @@ class Ground:
         left[..., 1] = 1.0
         return np.abs(self.raster.climb(poses, left)[0]) <= self.raster.max_cross_slope + 1e-9
 
-    def least(self, low: ArrayLike, high: ArrayLike) -> float:
-        """A number that no rate is below while x and y [m] are between two corners (2,)."""
-        if self.raster is not None:
-            return self.price * self.raster.least(np.asarray(low), np.asarray(high))
-        box = shapely.box(*np.asarray(low)[:2], *np.asarray(high)[:2])
-        solid = [part.core for part in parts_of(self.areas) if not part.radius]
-        return self.price if solid and shapely.union_all(solid).covers(box) else 0.0
-
     def smooth(self) -> Ground:
         """Ground that is nearly the same, but has no jump at the edge of an area."""
         return self if self.raster is not None else replace(self, edge=self.scale)
+
+    def jumps(self, lines: Array, aside: Array) -> Array:
+        """By how much the rate may jump (n,) within `aside` (n,) [m] of lines (n, points, 2)."""
+        discs, _, edges, most = self._shapes()
+        ways = shapely.linestrings(lines)
+        near = shapely.dwithin(edges, ways, aside)
+        for disc in discs:
+            away = np.hypot(*np.moveaxis(lines - disc.middle, -1, 0)).max(axis=1)
+            met = shapely.dwithin(disc.core, ways, disc.radius + aside)
+            near |= met & (away >= disc.radius - aside)
+        return np.asarray(most * near)
 
     def moved(self, by: LieGroup) -> Ground:
         """The ground moved by a planar pose."""
         raster = None if self.raster is None else self.raster.moved(by)
         return replace(self, areas=tuple(one.moved(by) for one in self.areas), raster=raster)
 
+    @kept_by_first
+    def _parts(self) -> list[ShapePart]:
+        """Shapes outside of which nothing costs, as shapely knows them."""
+        return parts_of(self.extent)
+
+    @kept_by_first
+    def _shapes(self) -> tuple[list[ShapePart], Any, Any, float]:
+        """Discs, the rest as one, its outline, and by how much the rate jumps there at most."""
+        whole = united(one.core for one in self._parts() if not one.radius)
+        edges = whole.boundary
+        shapely.prepare([whole, edges])
+        seen = np.ones(1) if self.raster is None else self.raster.slopes or self.raster.values
+        discs = [one for one in self._parts() if one.radius]
+        return discs, whole, edges, self.price * float(np.abs(seen).max())
+
     def _inside(self, places: Array) -> NDArray[np.bool_]:
-        inside = np.zeros(places.shape[:-1], dtype=np.bool_)
-        for part in parts_of(self.areas):
-            x, y = np.moveaxis(places - part.middle, -1, 0)
-            near = (np.abs(x) <= part.reach) & (np.abs(y) <= part.reach) & ~inside
-            if part.radius:
-                inside[near] = np.hypot(x[near], y[near]) <= part.radius
-                continue
-            shapely.prepare(part.core)
-            inside[near] = shapely.intersects_xy(part.core, places[near])
-        return inside
+        discs, whole, *_ = self._shapes()
+        inside = shapely.intersects_xy(whole, *np.moveaxis(places, -1, 0))
+        for disc in discs:
+            inside |= np.hypot(*np.moveaxis(places - disc.middle, -1, 0)) <= disc.radius
+        return np.asarray(inside)
 
     def _depths(self, places: Array) -> Array:
         """From 0 half an edge outside of all areas to 1 as far inside of one, without a kink."""
-        share = np.clip(0.5 + self._inwards(places) / self.edge, 0.0, 1.0)
+        discs, whole, edges, _ = self._shapes()
+        points = shapely.points(places)
+        away = shapely.distance(edges, points)  # NaN where there are discs alone
+        depth = np.where(shapely.intersects(whole, points), away, -away)
+        for disc in discs:
+            depth = np.fmax(depth, disc.radius - np.linalg.norm(places - disc.middle, axis=-1))
+        share = np.clip(0.5 + depth / self.edge, 0.0, 1.0)
         return np.asarray(share * share * (3.0 - 2.0 * share))
-
-    def unseen(self, places: Array, ways: Array, lasting: Array) -> Array:
-        """What an area may cost (n,) between two looks of four at stretches about places [m, s]."""
-        near = np.abs(self._inwards(places)) <= 0.5 * ways
-        return near * (0.25 * self.price) * (ways if self.per == "metre" else lasting)
-
-    def _inwards(self, places: Array) -> Array:
-        """Distances (...,) [m] to the border of the areas, negative outside; -inf without areas."""
-        parts, points = parts_of(self.areas), shapely.points(places)
-        depth = np.full(places.shape[:-1], -math.inf)
-        for disc in parts:
-            if disc.radius:
-                away = disc.radius - np.hypot(*np.moveaxis(places - disc.middle, -1, 0))
-                depth = np.maximum(depth, away)
-        if solid := [part.core for part in parts if not part.radius]:
-            whole = shapely.union_all(solid)
-            away = shapely.distance(whole.boundary, points)
-            depth = np.maximum(depth, np.where(shapely.intersects(whole, points), away, -away))
-        return depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -501,18 +497,6 @@ class Raster:
         x, y = (self.at(one, places[:1] if alike else places) for one in self.slopes)
         gained = x * (cosine * ahead - sine * left) + y * (sine * ahead + cosine * left)
         return np.asarray(gained), np.asarray(np.hypot(ahead, left))
-
-    def least(self, low: Array, high: Array) -> float:
-        """A number that no price is below in a box."""
-        corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])
-        cells = SE2(self.origin).inverse().act(corners) / self.resolution
-        first, last = cells.min(axis=0), cells.max(axis=0)
-        shape = np.array(self.values.shape[::-1])
-        if self.are_heights or (first < 0.0).any() or (last > shape).any():
-            return 0.0
-        j, i = np.maximum(np.floor(first - 0.5), 0).astype(int)
-        k, n = np.ceil(last + 0.5).astype(int)
-        return float(self.values[i : n + 1, j : k + 1].min())
 
     def moved(self, by: LieGroup) -> Raster:
         """The raster moved by a planar pose."""
@@ -598,6 +582,12 @@ def scale_of(cost: PlaceCost) -> float:
     scale = as_number(about, getattr(cost, "scale", SCALE))
     check_range(about, scale, unit="m", infinite=True)
     return scale
+
+
+def jumps_along(cost: PlaceCost, lines: Array, aside: Array) -> Array:
+    """By how much a rate may jump (n,) within `aside` of lines (n, points, 2); 0 if not said."""
+    own: Callable[[Array, Array], Array] | None = getattr(cost, "jumps", None)
+    return np.zeros(len(lines)) if own is None else own(lines, aside)
 
 
 def allowed(cost: PlaceCost, poses: Array, velocities: Array) -> NDArray[np.bool_]:

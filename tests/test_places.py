@@ -125,6 +125,40 @@ def test_the_corner_of_an_area_counts_however_small(x):
     assert verify(here, straight).audit.place_price == pytest.approx(0.8, abs=5e-3)
 
 
+@pytest.mark.parametrize("kind", ["corners", "boxes", "discs", "rasters"])
+def test_no_piece_over_an_edge_is_missed(kind):
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        trims = [CAR[name] for name in rng.choice(list(CONTROLS), 3)]
+        one = Plan(rng.uniform(-1, 1, 3), trims, durations=rng.uniform(0.3, 3.0, 3))
+        # From the left of some pose, an area reaches over the way by 0.1 to 50 mm.
+        here = SE2(one.pose_at(rng.uniform(0, one.duration)))
+        deep, size = 10 ** rng.uniform(-4, -1.3), rng.uniform(0.3, 2.0)
+        low, high, turn = rng.uniform(-1.4, -0.1), rng.uniform(0.1, 1.4), rng.uniform(-0.7, 0.7)
+        tips = size * np.array([[0, 0], [np.tan(low), 1], [np.tan(high), 1]]) - [0, deep]
+        edge = Polygon(here.act(tips))
+        solid = shapely.Polygon(edge.corners)
+        if kind == "discs":
+            edge = Disc(size, here.act([0, size - deep]))
+            solid = shapely.Point(edge.center).buffer(size, quad_segs=1000)
+        cost = Ground(edge, 5.0)
+        if kind in ("boxes", "rasters"):
+            origin = (here @ SE2([0, -deep, turn + np.pi / 4])).pose
+            solid = shapely.Polygon(SE2(origin).act(size * Box([1, 1], [0.5, 0.5]).corners))
+            box = Box([size, size], SE2(origin).act([size / 2, size / 2]), heading=origin[2])
+            flat = Ground.of_raster(np.full((4, 4), 5.0), resolution=size / 4, origin=origin)
+            cost = flat if kind == "rasters" else Ground(box, 5.0)
+        way = one.sample(max_step_m=5e-4).pose[:, :2]
+        steps = shapely.linestrings(np.stack([way[:-1], way[1:]], axis=1))
+        shapely.prepare(solid)
+        steps = steps[shapely.intersects(solid, steps)]
+        on = 5.0 * shapely.length(shapely.intersection(steps, solid)).sum()
+        asked = Problem(CAR, one.start, one.end, cost=Cost(length=1.0), place_costs=cost)
+        close = 5e-4 * (on + asked.invariant_cost_of(one))
+        assert asked.place_prices_of(one)[0].price == pytest.approx(on, abs=close)
+        assert verify(asked, one).audit.place_price == pytest.approx(on, abs=close)
+
+
 def test_rasters_hills_and_costmaps():
     values = np.random.default_rng(0).uniform(0.0, 2.0, (16, 44))
     at = {"resolution": 0.5, "origin": [-2.0, -4.0, 0.0]}
@@ -161,13 +195,10 @@ def test_a_slope_across_is_forbidden():
     assert flat.cost_of(Plan([0, 0, 0], (CAR["+1 +0.0"],), durations=[18.0])) == 18.0
 
 
-def test_gradients_and_least_rates():
+def test_gradients_of_rasters():
     raster = Ground.of_raster([[0.0, 1.0, 4.0]], resolution=1.0)
     poses = np.array([[1.0, 0.5, 0.3]])
     assert gradient_of(raster, poses, np.zeros((1, 3))) == pytest.approx(np.array([[1.0, 0, 0]]))
-    assert raster.least([1.6, 0.2], [1.9, 0.4]) == 1.0
-    assert Ground(Box([4, 4]), 3.0).least([-1, -1], [1, 1]) == 3.0
-    assert Ground(Box([4, 4]), 3.0).least([-1, -1], [3, 1]) == 0.0
 
 
 def test_a_moved_problem_has_a_moved_plan():

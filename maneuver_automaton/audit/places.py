@@ -14,12 +14,12 @@ from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.drive import DrivenPlan
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.passages import AuditedBody
-from maneuver_automaton.places import Clearance, Ground, PlaceCost, rates_along
+from maneuver_automaton.places import Clearance, PlaceCost, jumps_along, rates_along
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
 LONGEST = 0.75  # [s], [m] of a stretch, before any is halved
-MOST_ROUNDS = 22
+MOST_ROUNDS, MOST_SPANS = 22, 1 << 16
 # Lobatto's rule with four points, and Kronrod's seven that contain them: ends count, so that no
 # jump of a rate hides beyond the last one. Source: Gander and Gautschi (2000), Adaptive quadrature.
 SHARES = 0.5 + 0.5 * np.array(
@@ -40,14 +40,14 @@ def price_again(
 ) -> float:
     """The integral of a cost along a drive whose poses are counted from a place (dof,).
 
-    By two rules on each stretch, which is halved where they differ.
+    By two rules on each stretch, which is halved where they differ, or an edge may be between.
     """
     # Without a piece it stands for the time of the plan, which may be none.
     lasting = np.diff(drive.frames.times) if drive.pieces.size else np.full(1, drive.plan.duration)
 
-    def rates(spans: Spans) -> Array:
+    def rates(spans: Spans) -> tuple[Array, Array]:
         shares = (spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES).ravel()
-        element = np.repeat(spans.element, SHARES.size)
+        element, paid = np.repeat(spans.element, SHARES.size), np.arange(shares.size)
         if isinstance(cost, Clearance):
             scene = around.outline, around.heights, around.index, cost.within
             apart = []
@@ -60,36 +60,32 @@ def price_again(
                 apart.append(distances(body.outline, *moves, levels, *scene))
             near = 1.0 - np.minimum.reduce(apart) / cost.within
             found, paid = np.asarray(cost.weight * near * near), np.flatnonzero(near)
-        else:
-            found, paid = np.empty(shares.size), np.arange(shares.size)
-        twists = drive.twists_at(element[paid], shares[paid])
+        twists, jumps = drive.twists_at(element[paid], shares[paid]), np.zeros(len(spans.begin))
+        ways = np.delete(twists, 2, axis=1)
+        paces = np.linalg.norm(ways, axis=1) if cost.per == "metre" else np.ones(paid.size)
         if not isinstance(cost, Clearance):
-            found = rates_along(cost, drive.frames.at(element, shares) + offset, twists)
-        if cost.per == "metre":
-            found[paid] *= np.sqrt((np.delete(twists, 2, axis=1) ** 2).sum(axis=1))
-        return found.reshape(-1, SHARES.size)
+            poses = drive.frames.at(element, shares) + offset
+            found = rates_along(cost, poses, twists)
+            lines = poses[:, :2].reshape(-1, SHARES.size, 2)
+            bent = lines - lines[:, :1] - SHARES[:, None] * (lines[:, -1:] - lines[:, :1])
+            jumps = jumps_along(cost, lines, np.linalg.norm(bent, axis=2).max(axis=1))
+            jumps *= paces.reshape(-1, SHARES.size).max(axis=1)
+        found[paid] *= paces
+        return found.reshape(-1, SHARES.size), jumps
 
     spans = evenly(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
     done = 0.0
     for _ in range(MOST_ROUNDS):
-        values = rates(spans)
+        values, jumps = rates(spans)
         seconds = lasting[spans.element] * (spans.end - spans.begin)
         fine = values @ KRONROD * seconds
         off = np.abs(fine - values @ LOBATTO * seconds)
-        hides = np.zeros(len(off), dtype=bool)
-        if isinstance(cost, Ground):
-            middles = drive.frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + offset
-            ways = seconds * drive.frames.speed[spans.element]
-            hides = cost.unseen(middles[:, :2], ways, seconds) > CLOSE * whole
-        if off.sum() <= CLOSE * whole and not hides.any():
-            return done + float(fine.sum())
-        again = hides | (off > 0.25 * CLOSE * whole / len(off))
+        hidden = 0.25 * seconds * jumps > CLOSE * whole  # no points are further apart
+        if len(off) > MOST_SPANS or (off.sum() <= CLOSE * whole and not hidden.any()):
+            break
+        again = hidden | (off > 0.25 * CLOSE * whole / len(off))
         done += float(fine[~again].sum())
-        rest, fine = spans.of(again), fine[again]
-        middle = 0.5 * (rest.begin + rest.end)
-        spans = Spans(
-            np.repeat(rest.element, 2),
-            np.stack([rest.begin, middle], axis=1).ravel(),
-            np.stack([middle, rest.end], axis=1).ravel(),
-        )
+        fine, (element, begin, end) = fine[again], spans.of(again)
+        begin, end = np.stack([begin, m := 0.5 * (begin + end), m, end], axis=1).reshape(-1, 2).T
+        spans = Spans(np.repeat(element, 2), begin, end)
     return done + float(fine.sum())
