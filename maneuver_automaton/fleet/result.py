@@ -98,8 +98,8 @@ class FleetResult(Played):
 
     @property
     def gap(self) -> float | None:
-        """Share of the objective that is at most to be saved; None if someone has no plan."""
-        if self.status is not FleetStatus.FOUND:
+        """Share of the objective that is to be saved at most; None without plans or of nothing."""
+        if self.status is not FleetStatus.FOUND or self.lower_bound < self.value == 0.0:
             return None
         share = 1.0 - self.lower_bound / self.value if self.value else 0.0
         return max(0.0, share if self.value > 0.0 else -share)  # a clock may begin before 0

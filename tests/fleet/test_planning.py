@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.fleet.coordination import Turns
 from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
@@ -150,6 +152,8 @@ def test_the_last_arrival_may_be_what_counts(begin):
     assert result.value == result.last_s
     assert begin < result.lower_bound <= result.last_s
     assert result.lower_bound == result.last_s or result.gap > 0.0
+    at_0 = SimpleNamespace(status=result.status, value=0.0, lower_bound=-1.0)  # on that clock
+    assert FleetResult.gap.fget(at_0) is None
 
 
 @pytest.mark.parametrize(
