@@ -85,11 +85,6 @@ def rolled_out(problem, pose, trims):
     return kernels.roll_out(problem.tables, problem.seen(pose), sequence, poses, costs)
 
 
-def interval_costs(problem, pose):
-    """Cost of one interval of each trim from a pose of the world."""
-    return np.array([rolled_out(problem, pose, [k]) for k in range(len(problem.automaton))])
-
-
 def exhausted(problem, pose, *, first=None, max_intervals=100_000_000):
     """The cheapest of all sequences from a pose, by `exhaust`; a search gives the first guess."""
     sequence = np.array(search_horizon(problem, pose).trims if first is None else first)

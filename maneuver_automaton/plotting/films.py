@@ -8,7 +8,6 @@ import tempfile
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,7 @@ from maneuver_automaton.plotting.paths import (
 from maneuver_automaton.plotting.pictures import draw_world, plane_entries, see
 from maneuver_automaton.plotting.together import DASHES, HATCH
 from maneuver_automaton.plotting.track import placed
-from maneuver_automaton.recording import Event, recording_of
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.values import few
 
 FRAMES_PER_SECOND = 15
@@ -316,19 +315,14 @@ def _said(cast: Cast, time: float) -> list[str]:
     parts = [f"step {k}"]
     if np.isfinite(values.value[k]):
         parts.append(f"V = {values.value[k]:.4g}")
-    now = [event for event in recording.events if event.time == values.time[k]]
-    return parts + list(
-        chain(_texts_of(now, "replanned"), _texts_of(now, "exchanged"), _texts_of(now, "broken"))
-    )
-
-
-def _texts_of(events: Sequence[Event], kind: str) -> list[str]:
-    some = [event for event in events if event.kind == kind]
-    if not some:
-        return []
-    if kind != "exchanged":
-        return ["replanned" if kind == "replanned" else "guarantee broken"]
-    return [f"exchanged: {few([event.text for event in some], MOST_SAID)}"]
+    at = float(values.time[k])
+    if recording.texts("replanned", at):
+        parts.append("replanned")
+    if swaps := recording.texts("exchanged", at):
+        parts.append(f"exchanged: {few(swaps, MOST_SAID)}")
+    if recording.texts("broken", at):
+        parts.append("guarantee broken")
+    return parts
 
 
 def _draw_still(ax: Any, cast: Cast) -> None:

@@ -45,10 +45,10 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
     """
     if isinstance(result, Recording):
         return result
-    if (room := _room_of(result)) is not None:
-        made = room.recorded(result)
-        if isinstance(made, Recording):
-            return made
+    room = _room_of(result)
+    if room is not None and (record := room.RECORDED.get(type(result))) is not None:
+        made: Recording = record(result)
+        return made
     raise TypeError(
         f"recording: got {type(result).__name__}, need a Plan, PlanResult, ClosedLoop, "
         "FleetResult, FleetLog, or a plan or drive on roads"

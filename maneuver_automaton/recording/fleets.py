@@ -37,13 +37,6 @@ STANDS = "stands"  # the name of what a vehicle does while it has nothing to do
 SHORT = 1e-9  # [s] that is no time
 
 
-def recorded(result: FleetResult | FleetLog) -> Recording | None:
-    """The recording of a fleet's plans, or of its closed loop."""
-    if isinstance(result, FleetResult):
-        return _plans(result)
-    return _loop(result) if isinstance(result, FleetLog) else None
-
-
 def _plans(result: FleetResult) -> Recording:
     fleet = result.problem
     return Recording(
@@ -339,3 +332,6 @@ def _vehicles(log: FleetLog, driven: DrivenVerdict) -> Table:
         ])  # fmt: skip
     columns = ("vehicle", "status", "arrival [s]", "cost", "swaps", "off plan [m]", "clearance [m]")
     return Table(columns=columns, rows=rows, numbers=(2, 3, 4, 5, 6))
+
+
+RECORDED = {FleetResult: _plans, FleetLog: _loop}

@@ -25,16 +25,11 @@ from maneuver_automaton.recording.values import (
 )
 
 
-def recorded(result: ClosedLoop | Statistics) -> Recording | None:
-    """The recording of a closed loop."""
-    if isinstance(result, Statistics):
+def _loop(loop: ClosedLoop | Statistics) -> Recording:
+    if isinstance(loop, Statistics):
         raise TypeError(
             "recording: got Statistics, which keep no motion of their loops; need one loop"
         )
-    return _loop(result) if isinstance(result, ClosedLoop) else None
-
-
-def _loop(loop: ClosedLoop) -> Recording:
     problem, begin = loop.problem, float(loop.times[0])
     still = Plan(loop.poses[0], (), durations=[], start_time=begin)
     mover = mover_of(
@@ -199,3 +194,6 @@ def causes(statistics: Statistics) -> Iterator[str]:
         for cause, count in Counter(one.guarantee.value for one in found).most_common():
             yield f"{count} x {what}: {cause}"
     yield from (f"seed {one.seed}: {one.reason}" for one in outcomes if one.reason)
+
+
+RECORDED = {ClosedLoop: _loop, Statistics: _loop}

@@ -34,14 +34,9 @@ SIDES = (", left", ", right")
 BRIEF_S = 0.2  # straight between two bends, or at rest: what is shorter is joined to a neighbour
 
 
-def recorded(result: Plan | PlanResult) -> Recording | None:
-    """The recording of a plan, or of the answer to a problem."""
-    if isinstance(result, Plan):
-        duration = Fact(label="duration", value=result.duration, unit="s")
-        return Recording(
-            kind="plan", title="Plan", facts=(duration,), movers=(Mover(pieces=(result,)),)
-        )
-    return _answer(result) if isinstance(result, PlanResult) else None
+def _alone(plan: Plan) -> Recording:
+    duration = Fact(label="duration", value=plan.duration, unit="s")
+    return Recording(kind="plan", title="Plan", facts=(duration,), movers=(Mover(pieces=(plan,)),))
 
 
 def _answer(result: PlanResult) -> Recording:
@@ -238,3 +233,6 @@ def _motion(ahead: float, aside: float, turn: float) -> str:
     if abs(bend) <= STRAIGHT:
         return "at rest" if speed < AT_REST else where
     return f"{where}, {'left' if bend > 0.0 else 'right'}"
+
+
+RECORDED = {Plan: _alone, PlanResult: _answer}

@@ -32,19 +32,6 @@ from maneuver_automaton.roads import (
 )
 
 
-def recorded(
-    result: RoadPlanResult | RoadDrive | RoadFleetResult | RoadFleetDrive,
-) -> Recording | None:
-    """The recording of a plan or a drive on roads, of one vehicle or several."""
-    if isinstance(result, RoadPlanResult):
-        return _plan(result)
-    if isinstance(result, RoadDrive):
-        return _drive(result)
-    if isinstance(result, RoadFleetResult):
-        return _plans(result)
-    return _drives(result) if isinstance(result, RoadFleetDrive) else None
-
-
 def _plan(result: RoadPlanResult) -> Recording:
     verdict, plan = result.verdict, result.plan
     facts = []
@@ -288,3 +275,11 @@ def _across(name: str, planner: RoadPlanner, plan: Plan) -> Curve:
 def _solve_times(name: str, drive: RoadDrive) -> Curve:
     times = np.array([step.time for step in drive.steps], dtype=np.float64)
     return Curve(label="solve time", unit="s", time=times, value=drive.solve_s, mover=name)
+
+
+RECORDED = {
+    RoadPlanResult: _plan,
+    RoadDrive: _drive,
+    RoadFleetResult: _plans,
+    RoadFleetDrive: _drives,
+}

@@ -347,6 +347,10 @@ class Recording:
         """What a file calls its content: the scenario, or the file's own name."""
         return Path(path).stem if self.title in ("", *NAMELESS) else self.title
 
+    def texts(self, kind: str, time: float) -> list[str]:
+        """What is said of the events of a kind at a time [s]."""
+        return [one.text for one in self.events if one.kind == kind and one.time == time]
+
     @property
     def begin(self) -> float:
         """When the first may leave its start [s]."""

@@ -107,7 +107,7 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
 def _reach(vehicle: RoadVehicle, way: float) -> float:
     """How far the middle of a vehicle gets at most while its rear axle drives a way [m]."""
     # Turning into a direction, and backwards out of it, it gains by its place and loses by arcs.
-    tightest, ahead = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering), vehicle.ahead
+    tightest, ahead = vehicle.model.turning_radius, vehicle.ahead
     gained = 4.0 * abs(ahead - tightest * math.atan(ahead / tightest))
     return way + min((math.hypot(1.0, ahead / tightest) - 1.0) * way, gained)
 
@@ -127,7 +127,7 @@ def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, mo
     parts = shapely.get_parts(shapely.intersection(road, around))
     places = shapely.get_coordinates(parts[shapely.distance(parts, here) <= TOUCHES])
     aside = SE2(middle).inverse().act(places)[:, 1]
-    tightest = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering)
+    tightest = vehicle.model.turning_radius
     if np.ptp(aside) >= tightest + vehicle.ahead + 0.5 * (vehicle.length - vehicle.width):
         return ""
     return f"it is {away + back:.3g} m behind, and nowhere is there room to turn around"

@@ -94,7 +94,7 @@ def hindrance(route: Route, scene: RoadScene, vehicle: RoadVehicle) -> str:
             continue
         radius = 2.0 * AROUND * SPACING / abs(turn)
         inner, outer = free if turn > 0.0 else free[::-1]
-        tightest = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering)
+        tightest = vehicle.model.turning_radius
         inside = max(radius - inner, tightest - 0.5 * vehicle.width)
         front = vehicle.ahead + 0.5 * vehicle.length
         swept, room = math.hypot(inside + vehicle.width, front) - inside, radius + outer - inside

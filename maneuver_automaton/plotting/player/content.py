@@ -309,8 +309,8 @@ def _add_vehicles(
         fleet["steps"] = [
             {
                 "t": time,
-                "swaps": _texts_of(recording, "exchanged", time),
-                "broken": _texts_of(recording, "broken", time),
+                "swaps": recording.texts("exchanged", time),
+                "broken": recording.texts("broken", time),
             }
             for time in curve.time[:-1].tolist()
         ]
@@ -324,16 +324,12 @@ def _steps(cast: Cast, local: Local, numbers: Numbers) -> list[dict[str, Any]]:
         {
             "t": time,
             "value": value,
-            "replanned": any(e.kind == "replanned" and e.time == time for e in recording.events),
-            "broken": _texts_of(recording, "broken", time),
+            "replanned": bool(recording.texts("replanned", time)),
+            "broken": recording.texts("broken", time),
             "plan": motion_entry(track, local, numbers),
         }
         for (time, track), value in zip(one.held, values, strict=False)
     ]
-
-
-def _texts_of(recording: Recording, kind: str, time: float) -> list[str]:
-    return [one.text for one in recording.events if one.kind == kind and one.time == time]
 
 
 def _search(search: Search, local: Local) -> dict[str, Any]:
