@@ -231,19 +231,19 @@ def examine(
     defect: Defect,
     *,
     region: Region,
-    draw: Draw,
     rng: np.random.Generator | None,
     samples: int,
     tolerance: float,
+    draw: Draw | None = None,
 ) -> SymmetryReport:
-    """Try `samples` random states for every coordinate of the group."""
+    """Try `samples` random states, as `draw` draws them, for every coordinate of the group."""
     check_range("samples", samples, least=1)
     check_range("tolerance", tolerance, infinite=True)
     rng = np.random.default_rng(0) if rng is None else rng
 
     def tried(axis: int) -> Worst:
         by = region.element(rng, axis=axis)
-        state, control = draw(rng)
+        state, control = draw(rng) if draw else (region.state(rng), region.control(rng))
         change, size = defect(by, state, control)
         return Worst(change, tolerance * max(1.0, size), state, control, by)
 
@@ -259,7 +259,15 @@ def examine(
     order = np.argsort(-size, kind="stable")
     violated = tuple(int(i) for i in order if size[i] > worst.admitted)
     if broken:
-        message = _complaint(question, worst, broken, intact, violated)
+        first = violated[0]
+        still = f"; still invariant under {listed(intact)}" if intact else ""
+        under = f", u = {vector_text(worst.control)}" if worst.control.size else ""
+        message = (
+            f"{question.what} is not invariant under {listed(broken)}: {question.names(first)} "
+            f"changes by {abs(worst.defect[first]):.4g}{question.units(first)} at x = "
+            f"{vector_text(worst.state)}{under}, moved by {vector_text(worst.by.pose)}{still}; "
+            f"{question.cause(broken, violated)}"
+        )
     else:
         message = (
             f"{question.what} is invariant under {listed(intact)} "
@@ -277,23 +285,4 @@ def examine(
         broken=broken,
         intact=intact,
         message=message,
-    )
-
-
-def _complaint(
-    question: Question,
-    worst: Worst,
-    broken: tuple[str, ...],
-    intact: tuple[str, ...],
-    violated: tuple[int, ...],
-) -> str:
-    first = violated[0]
-    where = f"at x = {vector_text(worst.state)}"
-    if worst.control.size:
-        where += f", u = {vector_text(worst.control)}"
-    still = f"; still invariant under {listed(intact)}" if intact else ""
-    return (
-        f"{question.what} is not invariant under {listed(broken)}: {question.names(first)} changes "
-        f"by {abs(worst.defect[first]):.4g}{question.units(first)} {where}, moved by "
-        f"{vector_text(worst.by.pose)}{still}; {question.cause(broken, violated)}"
     )

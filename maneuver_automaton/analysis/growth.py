@@ -161,15 +161,8 @@ def growth_bound(
     return GrowthBound(times=t, bounds=bounds, worst=seen[worst], samples=rates.size)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Paces:
-    """Pairs of a spin rate and a speed that a library has in both signs, and what they cost."""
-
-    turn: Array  # (p,) [rad/s]
-    turn_controls: Array  # (p, 2, n_u) to the right, to the left
-    speed: Array  # (p,) [m/s]
-    speed_controls: Array  # (p, 2, n_u) back, ahead
-    rest_rate: float  # what resting costs per second
+_Paces = tuple[list[tuple[Array, Array]], float]
+"""Speeds (4,) and what they cost per second in both signs (4, 2), pair by pair; what rest costs."""
 
 
 def _paces(automaton: Automaton, cost: _PoseCost) -> _Paces:
@@ -188,14 +181,11 @@ def _paces(automaton: Automaton, cost: _PoseCost) -> _Paces:
     ]
     if lacking or rest is None:
         raise InvalidAutomaton(f"growth bound: the library lacks {', '.join(lacking)}")
-    pairs = list(itertools.product(spins, straights))
-    return _Paces(
-        turn=np.array([spin for (spin, _), _ in pairs]),
-        turn_controls=np.array([pair for (_, pair), _ in pairs]),
-        speed=np.array([speed for _, (speed, _) in pairs]),
-        speed_controls=np.array([pair for _, (_, pair) in pairs]),
-        rest_rate=float(cost.control_rates(controls[rest])),
-    )
+    pairs = [
+        (np.array([spin, speed] * 2), cost.control_rates(np.array([right_left, back_ahead] * 2)))
+        for (spin, right_left), (speed, back_ahead) in itertools.product(spins, straights)
+    ]
+    return pairs, float(cost.control_rates(controls[rest]))
 
 
 def _both_signs(
@@ -209,15 +199,12 @@ def _both_signs(
 
 def _values(pose: Array, paces: _Paces, cost: _PoseCost, times: Array) -> Array:
     """Least cost (k,) of the family from a pose over each of the times."""
-    segments = _segments(pose)
-    least: Array = times * (cost.pose_rates(pose) + paces.rest_rate)
-    for k in range(paces.turn.size):
-        pace = np.array([paces.turn[k], paces.speed[k]] * 2)
-        pair = (paces.turn_controls[k], paces.speed_controls[k])
-        control = np.array([cost.control_rates(controls) for controls in pair] * 2)  # (4, 2)
+    segments, (pairs, rest_rate) = _segments(pose), paces
+    least: Array = times * (cost.pose_rates(pose) + rest_rate)
+    for pace, control in pairs:
         words = _word_costs(segments, pace, control, cost, times)
         driven = np.minimum(times[:, None], (np.abs(segments[2]) / pace).sum(axis=-1))
-        totals = words + paces.rest_rate * (times[:, None] - driven)
+        totals = words + rest_rate * (times[:, None] - driven)
         least = np.minimum(least, totals.min(axis=1))
     return least
 

@@ -88,7 +88,6 @@ def check_vector_field(
         _question("vector field", "{} rate", "/s", region),
         defect,
         region=region,
-        draw=lambda rng: (region.state(rng), region.control(rng)),
         rng=rng,
         samples=samples,
         tolerance=tolerance,
@@ -183,17 +182,9 @@ def _question(what: str, name: str, per: str, region: Region) -> Question:
     def units(i: int) -> str:
         return f"{unit_of(names[i])}{per}" if i < region.group.dof else ""
 
-    return Question(
-        what=what, names=lambda i: name.format(names[i]), units=units, cause=_cause_in(region)
-    )
-
-
-def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], str]:
-    """Words for why the dynamics depend on where they are, from what shows it."""
-
     def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
-        name = region.state_names[violated[0]]
-        turns, drifts = name.startswith("heading"), violated[0] < region.group.dof
+        """Why the dynamics depend on where they are, from what shows it."""
+        turns, drifts = names[violated[0]].startswith("heading"), violated[0] < region.group.dof
         if any(motion.startswith("translation") for motion in broken):
             what = "currents or a map" if drifts else "ground or friction"
             return f"it depends on the place, as with {what} that changes from place to place"
@@ -204,7 +195,7 @@ def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], st
             return f"it depends on {where}a direction of the world, as {what}"
         return "it depends on the height, as with thinner air"
 
-    return cause
+    return Question(what=what, names=lambda i: name.format(names[i]), units=units, cause=cause)
 
 
 BoundaryFunction = Callable[[Array, Array], ArrayLike]
@@ -342,10 +333,10 @@ def _check(
         question,
         defect,
         region=region,
-        draw=draw or (lambda rng: (region.state(rng), region.control(rng))),
         rng=rng,
         samples=samples,
         tolerance=tolerance,
+        draw=draw,
     )
 
 

@@ -377,8 +377,7 @@ COMMANDS = {
 TOGETHER = {  # arguments that travel as one value of `inputs`, made where the last is given
     "parts": ("Parts", "case"),
     "look": ("LookOptions", "title"),
-    "budgets": ("Budgets", "gap"),
-    "options": ("Options", "budgets"),
+    "options": ("Options", "gap"),
 }
 
 

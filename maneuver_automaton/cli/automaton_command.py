@@ -69,29 +69,30 @@ def _build_maneuvers(
     with writing(path), naming(file), shown as advance:
         count = None if advance is None else counted(advance)
         try:
-            built = build_file.build(asked, path, jobs=jobs, scheduler=scheduler, progress=count)
+            automaton, one = build_file.build(
+                asked, path, jobs=jobs, scheduler=scheduler, progress=count
+            )
         except KeyboardInterrupt:
             complain(f"{file}: interrupted: called again, the build goes on after what is done")
             raise
     for missing in asked.missing:
         complain(f"{file}: no trim at {missing.name}: {missing.reason}")
-    for failure in built.failures:
+    failures = () if one is None else one.failures
+    for failure in failures:
         complain(f"{file}: no maneuver from {failure.source} to {failure.target}: {failure.reason}")
-    _print_library(path, built.automaton, quiet=quiet)
-    if built.build is not None and not quiet:
-        one = built.build
+    _print_library(path, automaton, quiet=quiet)
+    if one is not None and not quiet:
         say(
             f"  {one.solved} solved, {one.resumed} from the journal of a build before, "
             f"{one.mirrored} mirror images in {one.build_s:.1f} s; driven again they end "
             f"{one.worst_defect:.1e} off at most"
         )
-    return NO_PLAN if built.failures else FOUND
+    return NO_PLAN if failures else FOUND
 
 
 def _print_library(path: Path, automaton: Automaton, *, quiet: bool) -> None:
     if not quiet:
-        said = f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}"
-        say(said)
+        say(f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}")
 
 
 def show(file: Path, *, coverage: bool, model: str | None) -> int:

@@ -32,7 +32,7 @@ from maneuver_automaton.scenario import FleetScenario
 def planned(job: Job, scenario: FleetScenario) -> JobResult:
     """Plan them all."""
     options, said = job.options, scenario.settings
-    limit, best = options.budgets.time_limit or scenario.time_limit_s, [""]
+    limit, best = options.time_limit or scenario.time_limit_s, [""]
 
     def better(seconds: float, value: float) -> None:
         best[0] = f"{said.objective} {value:.6g}, found after {seconds:.3g} s"
@@ -110,7 +110,7 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
     """The closed loop, from plans with room for noise."""
     part, options = scenario.receding_horizon, job.options
     assert part is not None
-    steps, seed = options.budgets.steps or part.steps or STEPS, options.seed
+    steps, seed = options.steps or part.steps or STEPS, options.seed
     if seed is None:
         seed = 0 if part.disturbance is None else part.disturbance.seed
     log = None if options.resume is None else load_fleet_loop(options.resume, scenario.fleet)
@@ -127,7 +127,7 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
             log=log,
             margin=part.margin,
             tube_m=part.tube_m,
-            time_limit=options.budgets.time_limit or part.time_limit_s,
+            time_limit=options.time_limit or part.time_limit_s,
             swaps_per_step=part.swaps_per_step,
             group_size=part.group_size,
             delay_steps=part.delay_steps,

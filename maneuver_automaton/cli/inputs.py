@@ -225,13 +225,21 @@ def _wrong(said: str) -> InvalidScenario:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Budgets:
-    """How long, how well and how often is searched."""
+class Options:
+    """Options of `plan` and `mpc`, the same for every file of a folder."""
 
     time_limit: float | None = None  # [s] of a plan or a step; None: that of the scenario
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
     alternatives: int = 0
     steps: int | None = None  # of a loop; None: those of the scenario
+    look: LookOptions = field(default_factory=LookOptions)
+    quiet: bool = False
+    leave: bool = False  # a start in contact is left first
+    seed: int | None = None
+    seeds: int | None = None  # how many seeds in a row, for statistics
+    resume: Path | None = None
+    jobs: int = 1  # processes: for the files of a folder, for seeds, or for one fleet
+    scheduler: str | None = None  # of Dask, for the same
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
@@ -242,21 +250,6 @@ class Budgets:
             raise InvalidScenario(
                 f"--gap: got {self.gap}, need a share of the cost from 0 to below 1, such as 0.05"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """Options of `plan` and `mpc`, the same for every file of a folder."""
-
-    budgets: Budgets = field(default_factory=Budgets)
-    look: LookOptions = field(default_factory=LookOptions)
-    quiet: bool = False
-    leave: bool = False  # a start in contact is left first
-    seed: int | None = None
-    seeds: int | None = None  # how many seeds in a row, for statistics
-    resume: Path | None = None
-    jobs: int = 1  # processes: for the files of a folder, for seeds, or for one fleet
-    scheduler: str | None = None  # of Dask, for the same
 
 
 ONE = "is for one vehicle, but {path} states several; leave it out"
@@ -282,8 +275,8 @@ def refuse_unknown(path: Path, command: str, kind: str, options: Options, parts:
     given = {
         "--dask": options.scheduler is not None,
         "--leave": options.leave,
-        "--alternatives": options.budgets.alternatives > 0,
-        "--gap": options.budgets.gap is not None,
+        "--alternatives": options.alternatives > 0,
+        "--gap": options.gap is not None,
         "--seeds": options.seeds is not None,
         "--resume": options.resume is not None,
         "--model": parts.model is not None,

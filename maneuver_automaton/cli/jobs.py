@@ -146,7 +146,7 @@ class Job:
     def order(self, outcome: JobResult, out: Path) -> tuple[Any, ...]:
         """What `draw` is asked for."""
         result, look = outcome.result, self.options.look
-        if not (progress := self.options.budgets.gap is not None):
+        if not (progress := self.options.gap is not None):
             result = recording_of(result)  # which is read without all that plans
         return result, outcome.name, out / DOCUMENTS[self.command], look, progress
 
@@ -159,7 +159,7 @@ def plan(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool
 
 def mpc(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool) -> int:
     """Close the loop of a file, or of all of a folder; the exit code."""
-    if alternatives := options.budgets.alternatives:
+    if alternatives := options.alternatives:
         raise InvalidScenario(
             f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
             "leave it out, or ask plan for them"

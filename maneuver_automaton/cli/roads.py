@@ -39,7 +39,7 @@ def planned(job: Job, _: None) -> JobResult:
     if states_several(job.path, job.parts):
         return _plans(job)
     found = _scenario(job)
-    limit = job.options.budgets.time_limit or TIME_LIMIT
+    limit = job.options.time_limit or TIME_LIMIT
     with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet), naming(job.path):
         result = plan_road(found.scene, found.vehicle, time_limit=limit)
     if stopped() and result.plan is None:
@@ -66,21 +66,21 @@ def driven(job: Job, _: None) -> JobResult:
     """
     if states_several(job.path, job.parts):
         return _drives(job)
-    found, budgets = _scenario(job), job.options.budgets
+    found, options = _scenario(job), job.options
     with patient():
         with naming(job.path):
             planner = road_planner(found.scene, found.vehicle)
-        limit = budgets.time_limit or TIME_LIMIT
-        with waiting(f"planning before the start, at most {limit:g} s", quiet=job.options.quiet):
+        limit = options.time_limit or TIME_LIMIT
+        with waiting(f"planning before the start, at most {limit:g} s", quiet=options.quiet):
             before = plan_before(planner, time_limit=limit)
         if before is not None and before.plan is None and planner.hopeless() is None:
             complain(f"{job.path}: no plan before the start: {before.reason}")
         last = planner.last_tick // planner.every
-        most = min(budgets.steps or last, last)
-        with progress_bar("steps", most, quiet=job.options.quiet) as advance:
+        most = min(options.steps or last, last)
+        with progress_bar("steps", most, quiet=options.quiet) as advance:
             drive = drive_scene(
                 planner,
-                steps=budgets.steps,
+                steps=options.steps,
                 first=None if before is None else before.decision,
                 progress=lambda _: advance(),
             )
@@ -106,7 +106,7 @@ def _scenario(job: Job) -> RoadScenario:
 
 def _plans(job: Job) -> JobResult:
     scenes, vehicle, name = _scenes(job)
-    limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
+    limit = job.options.time_limit or TIME_LIMIT * len(scenes)
     with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet), naming(job.path):
         result = plan_roads(scenes, vehicle, name=name, time_limit=limit)
     status = "found" if result.found else "partial" if result.plans else "no_plan"
@@ -126,8 +126,8 @@ def _plans(job: Job) -> JobResult:
 
 def _drives(job: Job) -> JobResult:
     scenes, vehicle, name = _scenes(job)
-    steps, quiet = job.options.budgets.steps, job.options.quiet
-    limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
+    steps, quiet = job.options.steps, job.options.quiet
+    limit = job.options.time_limit or TIME_LIMIT * len(scenes)
     lasting = [min(one.last_time - one.start.time, LONGEST) for one in scenes.values()]
     clocks = [one.step for one in scenes.values()]
     ends = [max(math.ceil(s / step), 1) for s, step in zip(lasting, clocks, strict=True)]

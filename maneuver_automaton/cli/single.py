@@ -24,20 +24,20 @@ STEPS = 100  # of a loop, where neither file nor option says
 
 def planned(job: Job, scenario: Scenario) -> JobResult:
     """Plan the problem of a file."""
-    budgets, quiet = job.options.budgets, job.options.quiet
-    limit = budgets.time_limit or scenario.time_limit_s
-    shown = SoFar(watch=Watch(gap=-math.inf if budgets.gap is None else budgets.gap))
+    options, quiet = job.options, job.options.quiet
+    limit = options.time_limit or scenario.time_limit_s
+    shown = SoFar(watch=Watch(gap=-math.inf if options.gap is None else options.gap))
     live = not quiet and has_terminal()
     try:
         with waiting(f"planning, at most {limit:g} s", quiet=quiet, more=lambda: shown.text):
             result = planning.plan(
                 scenario.problem,
                 time_limit=limit,
-                alternatives=budgets.alternatives,
-                gap=budgets.gap,
+                alternatives=options.alternatives,
+                gap=options.gap,
                 watch=shown.watch if live else None,
                 on_better=shown.better if live else None,
-                leave=job.options.leave,
+                leave=options.leave,
             )
     except KeyboardInterrupt:
         if not stopped():
@@ -49,7 +49,7 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
     found, status, name = result.plan is not None, result.status.value, scenario.name
     facts = [  # the cost with the gap, too, where that was asked for and is open
         replace(one, note=f", gap {100.0 * (result.gap or 0.0):.2g} %")
-        for one in (() if budgets.gap is None else recording_of(result).facts)
+        for one in (() if options.gap is None else recording_of(result).facts)
         if one.bound is not None and one.bound != one.value
     ]
     return JobResult(
@@ -95,17 +95,16 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
     """Close the loop of a file, once or with seed after seed."""
     part, options = scenario.receding_horizon, job.options
     assert part is not None
-    budgets, noise = options.budgets, part.disturbance
-    steps = budgets.steps or part.steps or STEPS
+    noise, steps = part.disturbance, options.steps or part.steps or STEPS
     how: dict[str, Any] = {
         "step": part.step_s,
         "steps": steps,
         "margin": part.margin,
-        "time_limit": budgets.time_limit or scenario.time_limit_s,
+        "time_limit": options.time_limit or scenario.time_limit_s,
         "stay": part.stay,
         "retimed": part.retimed,
         "pieces": part.pieces or 0,
-        "gap": budgets.gap,
+        "gap": options.gap,
     }
     with naming(job.path, "receding_horizon: "):
         if options.seeds is not None:

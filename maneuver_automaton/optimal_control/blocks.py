@@ -48,14 +48,6 @@ class Blocks(NamedTuple):
         return int(self.variables.shape[1])
 
 
-class BlockProgram(NamedTuple):
-    """A nonlinear program in symbols, with its derivatives."""
-
-    functions: dict[str, Any]  # x, p, f, g
-    derivatives: dict[str, Any]  # options of ``casadi.nlpsol``
-    limits: Array  # (rows, 2)
-
-
 def kind_of(
     casadi: Any,
     variables: Any,
@@ -104,8 +96,14 @@ def _places(matrix: Any) -> tuple[IntArray, IntArray]:
     return np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64)
 
 
-def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -> BlockProgram:
-    """The program of `size` variables and so many parameters that blocks add up to."""
+def assembled(
+    casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int
+) -> tuple[dict[str, Any], dict[str, Any], Array]:
+    """The program of `size` variables and so many parameters that blocks add up to.
+
+    Its functions x, p, f, g in symbols, their derivatives as options of ``casadi.nlpsol``, and
+    limits (rows, 2).
+    """
     x, p = casadi.MX.sym("x", size), casadi.MX.sym("p", given)
     limits = np.concatenate([np.tile(one.kind.limits, (one.number, 1)) for one in blocks])
     of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", len(limits))
@@ -143,7 +141,7 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
         "no_nlp_grad": True,  # nor are the multipliers of what is given asked for
         "calc_lam_p": False,
     }
-    return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, limits)
+    return {"x": x, "p": p, "f": price, "g": g}, derivatives, limits
 
 
 def _matrix(

@@ -140,17 +140,17 @@ def solver_of(
     priced = place_blocks(program, given)
     blocks += priced
     given += sum(one.given.size for one in priced)
-    built = assembled(casadi, blocks, size=len(bounds), given=given)
-    watcher = watcher_of(budget, built.limits, n_variables=len(bounds), n_given=given)
+    functions, derivatives, limits = assembled(casadi, blocks, size=len(bounds), given=given)
+    watcher = watcher_of(budget, limits, n_variables=len(bounds), n_given=given)
     most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
-    options = _options(program.settings, most) | built.derivatives
+    options = _options(program.settings, most) | derivatives
     options["iteration_callback"] = watcher
 
     @functools.cache
     def function(begin: Begin) -> Any:
-        return casadi.nlpsol("solver", "ipopt", built.functions, options | BEGINS[begin])
+        return casadi.nlpsol("solver", "ipopt", functions, options | BEGINS[begin])
 
-    return Solver(function, watcher, bounds, built.limits, corners, fixed)
+    return Solver(function, watcher, bounds, limits, corners, fixed)
 
 
 class CornerPlaces(NamedTuple):

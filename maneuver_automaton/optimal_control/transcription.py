@@ -58,20 +58,10 @@ class OptimalControlSolution:
         return Guess(state=self.state, control=self.control, duration=self.duration)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Evaluation:
-    """A candidate, computed in floating-point numbers by NumPy: see `evaluate`."""
-
-    cost: float
-    integrals: Mapping[str, Array]
-    worst_defect: float
-    worst_violation: float
-
-
 def evaluate(
     problem: OptimalControlProblem, grid: TimeGrid, *, state: Array, control: Array, duration: float
-) -> Evaluation:
-    """Cost, defects and violations of states (n, n_x) and controls (m, n_u) on a grid.
+) -> tuple[float, dict[str, Array], float, float]:
+    """Cost, integrals, worst defect and violation of states (n, n_x) and controls (m, n_u).
 
     Nothing of the solver is used: the functions of the problem are called on arrays.
     """
@@ -90,11 +80,11 @@ def evaluate(
     defects = state[:-1].T + added[:n_states] - state[1:].T
     sums = np.concatenate([np.zeros((len(integrands), 1)), added[n_states:].cumsum(axis=1)], axis=1)
     terminal = 0.0 if problem.terminal_cost is None else problem.terminal_cost(list(state[-1]))
-    return Evaluation(
-        cost=float(sums[0, -1]) + float(terminal),
-        integrals=dict(zip(problem.integrals, sums[1:], strict=True)),
-        worst_defect=_largest(np.abs(defects)),
-        worst_violation=_violation(problem, state, control, duration),
+    return (
+        float(sums[0, -1]) + float(terminal),
+        dict(zip(problem.integrals, sums[1:], strict=True)),
+        _largest(np.abs(defects)),
+        _violation(problem, state, control, duration),
     )
 
 
@@ -273,13 +263,14 @@ def solve(
     solved = time.perf_counter()
     values, status, reason, iterations = answered(solver, answer)
     state, control, duration = unpacked(problem, grid, values)
-    checked = evaluate(problem, grid, state=state, control=control, duration=duration)
-    worst = max(checked.worst_defect, checked.worst_violation)
-    if status is SolveStatus.SOLVED and not worst <= settings.admitted_defect:
+    cost, integrals, defect, violation = evaluate(
+        problem, grid, state=state, control=control, duration=duration
+    )
+    if status is SolveStatus.SOLVED and not max(defect, violation) <= settings.admitted_defect:
         status = SolveStatus.FAILED
         reason = (
-            f"{reason}, but the numbers do not hold: defect {checked.worst_defect:.3g}, violation "
-            f"{checked.worst_violation:.3g}, admitted {settings.admitted_defect:.3g}"
+            f"{reason}, but the numbers do not hold: defect {defect:.3g}, violation "
+            f"{violation:.3g}, admitted {settings.admitted_defect:.3g}"
         )
     return OptimalControlSolution(
         status=status,
@@ -287,13 +278,13 @@ def solve(
         time=np.linspace(0.0, duration, grid.n_nodes),
         state=state,
         control=control,
-        cost=checked.cost,
-        integrals=checked.integrals,
+        cost=cost,
+        integrals=integrals,
         iterations=iterations,
         build_s=built - began,
         solve_s=solved - built,
-        worst_defect=checked.worst_defect,
-        worst_violation=checked.worst_violation,
+        worst_defect=defect,
+        worst_violation=violation,
     )
 
 

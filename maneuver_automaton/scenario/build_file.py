@@ -15,7 +15,6 @@ from pydantic import AllowInfNan, BeforeValidator, Field, Strict
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.building import (
-    Failure,
     LibraryBuild,
     Pair,
     all_pairs,
@@ -176,17 +175,6 @@ class BuildFile:
         return chosen(nodes, keep_sign=part.keep_sign)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Built:
-    """A library that was built and written."""
-
-    automaton: Automaton
-    failures: tuple[Failure, ...]
-    build: LibraryBuild | None  # of optimal control
-
-    __repr__ = brief
-
-
 def is_build_file(path: Path) -> bool:
     """Whether a YAML file is a build file and no scenario."""
     if path.suffix not in (".yaml", ".yml"):
@@ -252,8 +240,8 @@ def build(
     jobs: int = 1,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Built:
-    """Build the library of a build file and write it to `path`; see `build_library`."""
+) -> tuple[Automaton, LibraryBuild | None]:
+    """The library of a build file, written to `path`, and how it was built if not at once."""
     part = asked.maneuvers
     if asked.at_once or not asked.model.reduced_names:
         automaton = Automaton.of_model(
@@ -268,7 +256,7 @@ def build(
         )
         automaton = replace(automaton, name=asked.name)
         save_library(automaton, path)
-        return Built(automaton=automaton, failures=(), build=None)
+        return automaton, None
     done = build_library(
         asked.model,
         asked.trims,
@@ -284,7 +272,7 @@ def build(
         name=asked.name,
         progress=progress,
     )
-    return Built(automaton=done.automaton, failures=done.failures, build=done)
+    return done.automaton, done
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:

@@ -47,7 +47,6 @@ from maneuver_automaton.scenario.schema import (
 )
 from maneuver_automaton.scenario.shapes import (
     GroundFile,
-    StatedPlaces,
     footprint_of,
     obstacles_of,
     places_of,
@@ -172,11 +171,11 @@ def scenario_of_document(
     built = time.perf_counter()
     _check_ends(document, file, automaton)
     cost = once(("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton))
-    places: StatedPlaces = once(
+    place_costs, ground_files = once(
         ("vehicle", "cost", "obstacles"), lambda: places_of(document, file.cost, folder)
     )
-    if places.walls:
-        obstacles = (*obstacles, *places.walls)
+    if walls := [one.walls for one in ground_files if one.walls is not None]:
+        obstacles = (*obstacles, *walls)
     fastest = max(math.hypot(*trim.body_velocity[:2]) for trim in automaton.trims)
     zones = once(
         ("vehicle", "automaton", "zones"),
@@ -213,7 +212,7 @@ def scenario_of_document(
             obstacles=obstacles,
             margin=file.margin_m,
             zones=zones,
-            place_costs=places.costs,
+            place_costs=place_costs,
             via=tuple(vias),
             order=file.order,
             **bodies,
@@ -224,7 +223,7 @@ def scenario_of_document(
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
         maps=maps,
-        ground_files=places.files,
+        ground_files=ground_files,
         stated=file.automaton,
         path=path,
         timing_s={"load": read - begin, "automaton": built - read},

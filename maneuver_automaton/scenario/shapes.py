@@ -222,21 +222,10 @@ class GroundFile:
     walls: OccupancyMap | None = None  # of a costmap
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class StatedPlaces:
-    """Costs of places of a file, the files among them, and the obstacles of its costmaps."""
-
-    costs: tuple[PlaceCost, ...] = ()
-    files: tuple[GroundFile, ...] = ()
-
-    @property
-    def walls(self) -> tuple[OccupancyMap, ...]:
-        """What the costmaps block."""
-        return tuple(one.walls for one in self.files if one.walls is not None)
-
-
-def places_of(document: Document, part: PricedCostPart, folder: Path) -> StatedPlaces:
-    """What the places of a file cost; paths are relative to `folder`."""
+def places_of(
+    document: Document, part: PricedCostPart, folder: Path
+) -> tuple[tuple[PlaceCost, ...], tuple[GroundFile, ...]]:
+    """What the places of a file cost, and the files of it; paths are relative to `folder`."""
     costs: list[PlaceCost] = []
     files: list[GroundFile] = []
     if part.clearance is not None:
@@ -251,7 +240,7 @@ def places_of(document: Document, part: PricedCostPart, folder: Path) -> StatedP
             continue
         files.append(_of_file(document, one, where, folder))
         costs.append(files[-1].ground)
-    return StatedPlaces(costs=tuple(costs), files=tuple(files))
+    return tuple(costs), tuple(files)
 
 
 def _of_file(document: Document, part: GroundPart, where: Where, folder: Path) -> GroundFile:

@@ -80,10 +80,10 @@ def test_maneuvers_at_once(tmp_path):
         "maneuvers: {pairs: neighbours, strokes_m: [0.5, -0.5]}}",
         name="cars.yaml",
     )
-    built = build(asked, tmp_path / "cars.json")
-    assert built.build is None
-    assert (len(built.automaton), len(built.automaton.maneuvers)) == (9, 46)
-    assert built.automaton.name == load_library(tmp_path / "cars.json").name == "cars"
+    automaton, solved = build(asked, tmp_path / "cars.json")
+    assert solved is None
+    assert (len(automaton), len(automaton.maneuvers)) == (9, 46)
+    assert automaton.name == load_library(tmp_path / "cars.json").name == "cars"
 
 
 def test_the_model_of_a_library_file_is_checked():

@@ -252,8 +252,13 @@ def clearance_entry(
         if isinstance(one, OccupancyMap):
             flat += [shapely.Polygon(p) for path in map_paths(one) for p in path.to_polygons()]
         elif one.motion is not None:
+            from_s, until_s = one.presence
+            if leave:  # as long as its motion lasts
+                first, last = one.motion.time[[0, -1]].tolist()
+                from_s, until_s = max(first, from_s), min(last, until_s)
+            there = (times >= from_s) & (times <= until_s)
             apart = _apart(placed, _moved(one, times))
-            least = np.minimum(least, np.where(_there(one, times, leave), apart, np.inf))
+            least = np.minimum(least, np.where(there, apart, np.inf))
         elif heights is not None and one.height is not None:
             below, above = one.height[0] - heights[:, 1], heights[:, 0] - one.height[1]
             rise = np.maximum(np.maximum(below, above), 0.0)
@@ -291,15 +296,6 @@ def _moved(one: Obstacle, times: Array) -> list[Any]:
         shapely.polygons(frames.act(shapely.get_coordinates(part.exterior)))
         for part in _solid(one.shape)
     ]
-
-
-def _there(one: Obstacle, times: Array, leave: bool) -> Any:
-    from_s, until_s = one.presence
-    there = (times >= from_s) & (times <= until_s)
-    if not leave or one.motion is None:
-        return there
-    first, last = one.motion.time[[0, -1]]
-    return there & (times >= first) & (times <= last)
 
 
 def distance_curve(times: Array, distances: Array) -> dict[str, Any] | None:
