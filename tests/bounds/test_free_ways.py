@@ -24,13 +24,6 @@ ROBOT = Automaton.of_controls(
 QUICKLY = [150, *range(0, 5000, 1002)]  # the first: a goal that something comes to later
 
 
-def batches(all_of_them, *, quick):
-    """First numbers of batches; all but a few are for changes that reach everything."""
-    few = all_of_them[:: -(-len(all_of_them) // quick)]
-    marks = pytest.mark.exhaustive
-    return [k if k in few else pytest.param(k, marks=marks) for k in all_of_them]
-
-
 @pytest.mark.parametrize("seed", QUICKLY)
 def test_no_drawn_scene_is_called_impossible(seed):
     assert wrong(drawn(seed)) == []
@@ -38,7 +31,7 @@ def test_no_drawn_scene_is_called_impossible(seed):
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-@pytest.mark.parametrize("first", batches(range(0, 5000, 100), quick=1))
+@pytest.mark.parametrize("first", range(0, 5000, 100))
 def test_none_of_5000_drawn_scenes_is_called_impossible(first):
     said = {k: what for k in range(first, first + 100) if (what := wrong(drawn(k)))}
     assert said == {}

@@ -86,19 +86,8 @@ def test_a_moved_fleet_has_the_moved_loop(by):
             assert other.poses[name][:2] == pytest.approx(moved[:2], abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", quick_are(range(3), range(40), exhaustive=True))
 def test_random_fleets_lose_no_plan(seed):
-    check_random(seed)
-
-
-@pytest.mark.slow
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("seed", range(3, 40))
-def test_more_random_fleets_lose_no_plan(seed):
-    check_random(seed)
-
-
-def check_random(seed):
     n = 2 + seed % 7
     fleet = scattered(n, seed)
     first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)

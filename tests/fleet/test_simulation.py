@@ -71,18 +71,8 @@ def test_beside_each_other_at_the_margin():
     assert not any(step.void for step in log.steps)
 
 
-def test_a_random_fleet_with_noise():
-    check_noisy(1)
-
-
-@pytest.mark.slow
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("seed", range(2, 30))
-def test_more_random_fleets_with_noise(seed):
-    check_noisy(seed)
-
-
-def check_noisy(seed):
+@pytest.mark.parametrize("seed", quick_are([1], range(1, 30), exhaustive=True))
+def test_random_fleets_with_noise(seed):
     fleet = scattered(2 + seed % 7, seed)
     breaks = {"1": 2.0} if seed % 2 else {}
     log = loop_of(fleet, disturbance=NOISE, seed=seed, breaks_s=breaks, group_size=3, steps=80)

@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import maneuver_automaton as ma
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.receding_horizon import ClosedLoop
@@ -63,12 +61,6 @@ def against_kept(name: str, before: Mapping[str, Any], now: Mapping[str, Any]) -
     if name not in dearer() and now["word"] != before["word"]:
         return f"{name}: {now['word']} costs as much as {before['word']}, but is another word"
     return ""
-
-
-def params(quick: Mapping[str, bool], *, exhaustive: bool = False) -> list[Any]:
-    """The names as parameters of a test; what is not quick is marked as slow, or as exhaustive."""
-    slow = [pytest.mark.slow, *([pytest.mark.exhaustive] if exhaustive else [])]
-    return [pytest.param(name, marks=() if fast else slow) for name, fast in quick.items()]
 
 
 def rounded(number: float) -> float:

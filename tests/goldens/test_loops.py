@@ -13,15 +13,16 @@ from tests.goldens.measured import (
     dearer,
     driven,
     kept,
-    params,
     record_of_loop,
     share_dearer,
 )
+from tests.quickly import quick_are
 from tests.search.cases import compiled_only
 
 LOOPS = all_loops()
-KINEMATIC = {name: loop.quick for name, loop in LOOPS.items() if not loop.inertia}
-WITH_INERTIA = {name: loop.quick for name, loop in LOOPS.items() if loop.inertia}
+QUICK = [name for name, loop in LOOPS.items() if loop.quick]
+WITH_INERTIA = [name for name, loop in LOOPS.items() if loop.inertia]
+KINEMATIC = [name for name in LOOPS if name not in WITH_INERTIA]
 SHARE = 1e-3  # by which a loop with inertia may be dearer than the cheapest of five
 
 
@@ -46,7 +47,7 @@ def against(name, before, now, *, share: float) -> str:
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params(KINEMATIC))
+@pytest.mark.parametrize("name", quick_are(QUICK, KINEMATIC))
 def test_a_loop_is_the_same_or_cheaper(name):
     before, now = kept("loops")[name], driven(name)
     problem = against(name, before, now, share=EQUAL)
@@ -58,7 +59,7 @@ def test_a_loop_is_the_same_or_cheaper(name):
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params(WITH_INERTIA, exhaustive=True))
+@pytest.mark.parametrize("name", quick_are(QUICK, WITH_INERTIA, exhaustive=True))
 def test_a_loop_with_inertia_is_not_much_dearer(name):
     before, problem = kept("loops")[name], ""
     for longer in LONGER:

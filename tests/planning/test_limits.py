@@ -52,21 +52,17 @@ def test_nobody_goes_on_after_the_deadline(name: str) -> None:
         assert after <= FEW, f"{after} looks after the first {looks}"
 
 
-def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
-    assert looks_after(TASKS["among obstacles"], 400, 0, 1.02)[1] is PlanStatus.FOUND
-
-
-def test_a_first_plan_is_checked_a_while_after_the_deadline() -> None:
-    assert looks_after(TASKS["among obstacles"], 20, 0, 1.1)[1] is PlanStatus.FOUND
-
-
-def test_a_plan_is_not_returned_late_for_its_checks() -> None:
-    assert looks_after(TASKS["among obstacles"], 20, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET
-
-
-def test_a_first_plan_is_checked_before_it_is_improved() -> None:
-    """Whatever holds the process up later, there is something to return."""
-    assert looks_after(TASKS["among obstacles"], 400, 0, 1.5)[1] is PlanStatus.FOUND
+@pytest.mark.parametrize(
+    ("looks", "late", "status"),
+    [
+        pytest.param(400, 1.02, PlanStatus.FOUND, id="found in time it is checked and returned"),
+        pytest.param(20, 1.1, PlanStatus.FOUND, id="a first plan a while after the deadline"),
+        pytest.param(20, 1.5, PlanStatus.OUT_OF_BUDGET, id="not late for its checks"),
+        pytest.param(400, 1.5, PlanStatus.FOUND, id="a first plan before it is improved"),
+    ],
+)
+def test_when_a_plan_is_checked(looks: int, late: float, status: PlanStatus) -> None:
+    assert looks_after(TASKS["among obstacles"], looks, 0, late)[1] is status
 
 
 def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.MonkeyPatch) -> None:
