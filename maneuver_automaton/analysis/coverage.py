@@ -209,9 +209,7 @@ class Dispersion:
     mean: float
     pose: Array  # (3,) the sample that is furthest from all
     reached: int  # poses at which words end
-    most: (
-        float  # cost of the costliest of these words [s or m]: less where the search was cut short
-    )
+    most: float  # cost of the costliest of them [s or m]: less where the search was cut short
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,9 @@ from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.exports.earth import degrees_of
-from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
+from maneuver_automaton.exports.surroundings import Part, parts_of, solid, solids_of, swept_by
 from maneuver_automaton.plotting.track import placed
-from maneuver_automaton.recording import Recording, recording_to_write
+from maneuver_automaton.recording import Mover, Recording, recording_to_write
 
 PLACES = (0, 1, 3)  # x, y and altitude of a pose
 LONGEST_M = 50.0  # between two points of a line that is written in degrees
@@ -100,17 +100,17 @@ def save_features(
 def _features(recording: Recording) -> Iterator[dict[str, Any]]:
     several = len(recording.movers) > 1
     for mover in recording.movers:
-        shown = shown_of(mover)
-        features = [*_path(shown), *_bodies(shown)] if mover.has_plan else []
-        for one in (*features, *_ends(shown)):
+        parts = parts_of(mover)
+        features = [*_path(mover, parts), *_bodies(mover, parts)] if mover.has_plan else []
+        for one in (*features, *_ends(mover)):
             if several:
                 one["properties"]["vehicle"] = mover.name
             yield one
     yield from _around(recording)
 
 
-def _path(shown: Shown) -> Iterator[dict[str, Any]]:
-    mover, track = shown.mover, shown.track
+def _path(mover: Mover, parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
+    track = parts[0][2]
     places = _places(np.concatenate([track.pose, np.array([mover.end])]))  # pushed, it ends there
     length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
     facts = {"duration_s": mover.duration, "length_m": length, "cost": mover.cost}
@@ -121,21 +121,21 @@ def _path(shown: Shown) -> Iterator[dict[str, Any]]:
         yield feature_of(line, kind="primitive", name=piece.name, begin_s=begin, end_s=end)
 
 
-def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
+def _bodies(mover: Mover, parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
     """The region that all bodies sweep, and where they are when primitives begin and end."""
-    if swept := shown.swept:
+    _, known, way = parts[0]
+    if swept := swept_by(parts):
         yield feature_of(geometry_of(shapely.union_all(swept)), kind="swept")
-    times = shown.track.switching_times
-    times = times if len(times) else np.array([shown.mover.start_time])
-    for name, body, track in shown.parts if shown.body else ():
+    times = way.switching_times
+    times = times if len(times) else np.array([mover.start_time])
+    for name, body, track in parts if known else ():
         for time, pose in zip(times.tolist(), track.at(times), strict=True):
             outlines = [solid(Polygon(ring)) for ring in placed(body, pose[None])]
             facts = {"part": name, "time_s": time, "heading_rad": float(pose[2])}
             yield feature_of(geometry_of(shapely.union_all(outlines)), kind="body", **facts)
 
 
-def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
-    mover = shown.mover
+def _ends(mover: Mover) -> Iterator[dict[str, Any]]:
     yield feature_of(_point(mover.start), kind="start", heading_rad=float(mover.start[2]))
     for goal in mover.goals:
         heading = None if goal.free_heading else float(goal.pose[2])

@@ -14,7 +14,7 @@ from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
+from maneuver_automaton.exports.surroundings import parts_of, solid, solid_map, swept_by
 from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color, track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.recording import Mover, Recording, recording_to_write
@@ -83,7 +83,7 @@ def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
         several = len(recording.movers) > 1
         for mover, table in zip(recording.movers, rows, strict=True):
             names = (mover.name,) if several else ()
-            _log_motion(log, shown_of(mover), table, names)
+            _log_motion(log, mover, table, names)
             _log_goals(log, mover, names)
             columns = table.columns()  # a pose shows in space, the rest over time
             for name in list(columns)[1 + table.pose.shape[1] : -1]:
@@ -139,9 +139,10 @@ class _Log:
         return self.rerun.TimeColumn(TIMELINE, duration=times)
 
 
-def _log_motion(log: _Log, shown: Shown, rows: PlanArrays, names: tuple[str, ...]) -> None:
+def _log_motion(log: _Log, mover: Mover, rows: PlanArrays, names: tuple[str, ...]) -> None:
     """Path and swept region as they are, bodies as they move, primitives as they begin."""
-    mover, track, colors = shown.mover, shown.track, track_colors(shown.track.twists)
+    parts = parts_of(mover)
+    track, colors = parts[0][2], track_colors(parts[0][2].twists)
     if track.pieces:
         log.fixed(
             log.entity(WORLD, *names, "path"),
@@ -152,10 +153,10 @@ def _log_motion(log: _Log, shown: Shown, rows: PlanArrays, names: tuple[str, ...
                 show_labels=False,
             ),
         )
-    if rings := [ring for one in shown.swept for ring in _rings(one, 0.0)]:
+    if rings := [ring for one in swept_by(parts) for ring in _rings(one, 0.0)]:
         log.fixed(log.entity(WORLD, *names, "swept"), log.outlines(rings, SWEPT))
     low, high = (0.0, 0.0) if mover.problem is None else mover.problem.body_height
-    for name, body, part in shown.parts:
+    for name, body, part in parts:
         frame = log.entity(WORLD, *names, name)
         log.moves(frame, rows.time, rows.pose if part is track else part.at(rows.time))
         if body:

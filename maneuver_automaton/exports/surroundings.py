@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._lazy import shapely
@@ -21,42 +20,23 @@ from maneuver_automaton.plotting.track import (
 )
 from maneuver_automaton.recording import Mover, Recording
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shown:
-    """Who moves, with a name, outlines (n, 2) [m] and a track of it and of all that it carries."""
-
-    mover: Mover
-    parts: tuple[tuple[str, tuple[Array, ...], Track], ...]
-
-    @property
-    def track(self) -> Track:
-        """Where the vehicle itself goes."""
-        return self.parts[0][2]
-
-    @property
-    def body(self) -> tuple[Array, ...]:
-        """Outlines of the vehicle itself; none if they are not known."""
-        return self.parts[0][1]
-
-    @property
-    def swept(self) -> list[Any]:
-        """Polygons of shapely that all parts sweep."""
-        return merged(
-            [one for _, body, track in self.parts if body for one in swept_region(track, body)]
-        )
+Part: TypeAlias = tuple[str, list[Array], Track]
+"""A vehicle, or what it carries: its name, outlines (n, 2) [m], none if not known, and track."""
 
 
-def shown_of(mover: Mover) -> Shown:
-    """A mover with its track; one that goes nowhere shows itself alone."""
+def parts_of(mover: Mover) -> list[Part]:
+    """A mover, then all that it carries; one that goes nowhere shows itself alone."""
     carried = mover.parts[1:] if mover.duration > 0.0 else ()
     names = ["vehicle", *(one.name for one in carried)]
-    rows = [
-        (name, tuple(footprint_polygons(one.bodies.get("", ()))),
-         joined_track(one.start, one.pieces))
+    return [
+        (name, footprint_polygons(one.bodies.get("", ())), joined_track(one.start, one.pieces))
         for name, one in zip(names, (mover, *carried), strict=True)
-    ]  # fmt: skip
-    return Shown(mover, tuple(rows))
+    ]
+
+
+def swept_by(parts: Sequence[Part]) -> list[Any]:
+    """Polygons of shapely that all parts sweep."""
+    return merged([one for _, body, track in parts if body for one in swept_region(track, body)])
 
 
 def solid(shape: Shape) -> Any:

@@ -157,22 +157,15 @@ def road_plan_to_dict(result: RoadPlanResult) -> RoadPlanDocument:
 
 def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> RoadFleetDocument:
     """The content of plan.json for several vehicles on one road."""
-    plans = result.plans.values()
-    verdicts = [one.verdict for one in result.results.values() if one.verdict is not None]
-    near = min((one.clearance_m for one in verdicts), default=math.inf)
     return document_of(
         RoadFleetDocument,
         result,
-        kind=FLEET,
+        **_together(result),
         status=status,
         reason=reason,
         cost=math.fsum(one.cost or 0.0 for one in result.results.values() if one.plan),
-        sum_s=math.fsum(plan.duration for plan in plans),
-        last_s=max((plan.start_time + plan.duration for plan in plans), default=0.0),
-        clearance_m={"between": number(result.distance_m), "to_obstacles": number(near)},
-        closest=result.pairs,
+        sum_s=math.fsum(plan.duration for plan in result.plans.values()),
         timing_s={"search": result.search_s},
-        notes=joint_notes(result),
         vehicles={
             name: {**road_plan_to_dict(one), "name": name} for name, one in result.results.items()
         },
@@ -187,23 +180,30 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
         )
         for name, one in drive.results.items()
     }
-    driven = drive.plans.values()
-    rows = drive.results.values()
-    near = min(one.verdict.clearance_m for one in rows)
     return document_of(
         RoadFleetDriveDocument,
         drive,
-        kind=FLEET,
+        **_together(drive),
         cost=math.fsum(one["cost"] for one in vehicles.values()),
-        duration_s=max((plan.duration for plan in driven), default=0.0),
-        last_s=max((plan.start_time + plan.duration for plan in driven), default=0.0),
+        duration_s=max((plan.duration for plan in drive.plans.values()), default=0.0),
         planned_before_s=drive.before.search_s,
-        clearance_m={"between": number(drive.distance_m), "to_obstacles": number(near)},
-        closest=drive.pairs,
-        collisions=sum(one.verdict.collisions for one in rows),
-        notes=joint_notes(drive),
+        collisions=sum(one.verdict.collisions for one in drive.results.values()),
         vehicles=vehicles,
     )
+
+
+def _together(fleet: RoadFleetResult | RoadFleetDrive) -> dict[str, Any]:
+    """What holds of several vehicles on one road together."""
+    ends = (plan.start_time + plan.duration for plan in fleet.plans.values())
+    verdicts = [one.verdict for one in fleet.results.values() if one.verdict is not None]
+    near = min((one.clearance_m for one in verdicts), default=None)
+    return {
+        "kind": FLEET,
+        "last_s": max(ends, default=0.0),
+        "clearance_m": {"between": number(fleet.distance_m), "to_obstacles": number(near)},
+        "closest": fleet.pairs,
+        "notes": joint_notes(fleet),
+    }
 
 
 def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> DriveDocument:

@@ -131,31 +131,29 @@ def _reduced_states(
     done, window = 0, k
     while done < k and not lost.any():
         stretch = slice(done, min(done + window, k))
-        solved = _picard(model, begin[:, done], control[:, stretch, None], step[:, stretch])
-        if solved.lost.any():
+        nodes, at_them, ends, iterations, not_solved = _picard(
+            model, begin[:, done], control[:, stretch, None], step[:, stretch]
+        )
+        if not_solved.any():
             if stretch.stop == done + 1:
-                lost[:, done] = solved.lost
+                lost[:, done] = not_solved
             window = (stretch.stop - done) // 2
             continue
-        at_nodes[:, stretch], rates[:, stretch] = solved.nodes, solved.rates
-        begin[:, done + 1 : stretch.stop + 1] = solved.ends
+        at_nodes[:, stretch], rates[:, stretch] = nodes, at_them
+        begin[:, done + 1 : stretch.stop + 1] = ends
         done = stretch.stop
-        window *= 2 if solved.iterations < ITERATIONS // 3 else 1
+        window *= 2 if iterations < ITERATIONS // 3 else 1
     return begin, at_nodes, rates, lost
 
 
-class _Stretch(NamedTuple):
-    """Reduced states of m rides on k elements."""
+def _picard(
+    model: Model, z: Array, control: Array, step: Array
+) -> tuple[Array, Array, Array, int, BoolArray]:
+    """Reduced states from those at the begin (m, n_z), by iteration over all elements at once.
 
-    nodes: Array  # (m, k, n, n_z) at the points
-    rates: Array  # (m, k, n, n_z) there
-    ends: Array  # (m, k, n_z) at the ends of the elements
-    iterations: int
-    lost: BoolArray  # (m,) rides for which the iteration came to nothing
-
-
-def _picard(model: Model, z: Array, control: Array, step: Array) -> _Stretch:
-    """Reduced states from those at the begin (m, n_z), by iteration over all elements at once."""
+    They and their rates at the points (m, k, n, n_z), at the ends of the elements (m, k, n_z); how
+    many iterations it took, and the rides (m,) for which these came to nothing.
+    """
     m, k = step.shape
     h, first = step[..., None], z[:, None]
     nodes = np.broadcast_to(first[:, None], (m, k, NODES.size, z.shape[1]))
@@ -177,7 +175,7 @@ def _picard(model: Model, z: Array, control: Array, step: Array) -> _Stretch:
             break
         before = change
     off = changes.reshape(m, -1).max(axis=1, initial=0.0)
-    return _Stretch(nodes, rates, ends, iteration, np.asarray(~(off <= NOISE)))
+    return nodes, rates, ends, iteration, np.asarray(~(off <= NOISE))
 
 
 def _is_rough(elements: Elements) -> BoolArray:
