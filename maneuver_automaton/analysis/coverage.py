@@ -81,13 +81,6 @@ def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSe
     return _searched(first, _steps(automaton, settings), settings)
 
 
-def rest_classes(automaton: Automaton) -> frozenset[int]:
-    """Classes in which the vehicle can stand still; all of them if it never can."""
-    still = ~automaton.body_velocities.any(axis=1)
-    chosen = automaton.trim_classes[still] if still.any() else automaton.trim_classes
-    return frozenset(chosen.tolist())
-
-
 def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Nodes]:
     """Maneuvers, and every trim for one edge, by class: where they lead, from 0."""
     rows: defaultdict[int, list[tuple[Array, float, int]]] = defaultdict(list)
@@ -385,8 +378,9 @@ def poses_in_ball(radius: float, count: int, *, seed: int) -> Array:
 
 
 def _at_rest(automaton: Automaton, words: Reached) -> Reached:
-    """The words that end where the vehicle can stand."""
-    ends = np.isin(words.classes, list(rest_classes(automaton)))
+    """The words that end where the vehicle can stand; all of them if it never can."""
+    still = ~automaton.body_velocities.any(axis=1)
+    ends = np.isin(words.classes, automaton.trim_classes[still if still.any() else ...])
     return replace(
         words, poses=words.poses[ends], costs=words.costs[ends], classes=words.classes[ends]
     )

@@ -203,8 +203,7 @@ def _in_least_time(problem: Problem) -> Problem:
     if not problem.bounds.are_open:
         raise ValueError("least times: bounds do not move with the symmetry; leave them out")
     most, horizon = problem.horizon.max_trims, problem.horizon
-    still = ~problem.automaton.body_velocities.any(axis=1)
-    if horizon.time is not None and most is not None and still.any():
+    if horizon.time is not None and most is not None and problem.automaton.rest is not None:
         if most == 1:
             raise ValueError(
                 "least times: a fixed time padded by rest leaves no trim to move with, need "

@@ -76,9 +76,7 @@ def save_film(recording: recordings.Recording, path: Path, look: Look) -> None:
 
 def why_no_film(recording: recordings.Recording) -> str:
     """Why nothing moves in a result: it holds no plan; empty if something does."""
-    if any(one.has_plan for one in recording.movers):
-        return ""
-    return f"holds no plan, its status is {recording.status!r}"
+    return "" if recording.drivers else f"holds no plan, its status is {recording.status!r}"
 
 
 def ready_to_draw() -> Any:

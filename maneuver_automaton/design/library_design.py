@@ -311,13 +311,13 @@ def design_of_file(
     name, text = str(path), read_text(Path(path))
     asked = build_file_of_text(text, name=name)
     document = parse(text, name=name, what="a design file")
-    if asked.design is None:
+    if asked.file.design is None:
         raise document.error(
             (), "misses the key design: how the trims are chosen, such as {within: 1.05}"
         )
-    part = asked.design.model_copy(update=dict(instead or {}))
+    part = asked.file.design.model_copy(update=dict(instead or {}))
     with at(document, ("trims",)):
-        candidates = Automaton(asked.model, asked.trims, name=asked.name)
+        candidates = Automaton(asked.model, asked.trims, name=asked.file.library)
     cost = cost_of(document, part.cost, candidates, within=("design",))
     with at(document, ("design",)):
         return design_library(

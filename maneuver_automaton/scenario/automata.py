@@ -27,6 +27,7 @@ from maneuver_automaton.models import (
     SecondOrderUnicycle,
     Unicycle,
 )
+from maneuver_automaton.models.kinds import is_of_a_kind
 from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim, trims_of
 from maneuver_automaton.primitives.closed_form import (
@@ -42,7 +43,7 @@ from maneuver_automaton.scenario.schema import (
     ManeuversPart,
     NamedTrim,
 )
-from maneuver_automaton.scenario.vehicles import AT_REST, described, is_known
+from maneuver_automaton.scenario.vehicles import AT_REST, described
 
 MAX_GRID_TRIMS = 100_000
 MAX_STEADY_TRIMS = 2_000  # of a grid that has to be solved for
@@ -72,7 +73,7 @@ def automaton_of(
         with at(document, (*WHERE, "file")):
             if (read := libraries.read_primitives(path, model)) is not None:
                 return _fitting(read.automaton, model)
-            if is_known(model):
+            if is_of_a_kind(model):
                 return _fitting(load_library(path), model)
             return load_library(path, model=model)
     if part.preset is not None:
@@ -244,7 +245,7 @@ def _values(axis: Axis) -> list[float]:
 
 def _fitting(automaton: Automaton, model: Model) -> Automaton:
     """The automaton of a library, if it is one of this vehicle."""
-    if not is_known(model):
+    if not is_of_a_kind(model):
         raise ValueError(
             f"got a library for {automaton.model.name}, but the vehicle is {model.name}"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -147,28 +147,25 @@ class LibraryFile(FilePart):
 class BuildFile:
     """What a build file asks for; trims that the vehicle does not have are left out, and named."""
 
-    name: str
+    file: LibraryFile
     model: Model
-    grid: Mapping[str, tuple[float, ...]]
-    max_lateral_acceleration: float | None  # [m/s^2]
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
-    maneuvers: JoiningPart
-    design: DesignPart | None = None
 
     __repr__ = brief
 
     @property
     def at_once(self) -> bool:
         """Whether the maneuvers come in closed form, without a solver and in no time."""
-        closed = has_limited_rates(self.model) and self.maneuvers.effort == 0.0
-        return closed and not isinstance(self.maneuvers.pairs, int)
+        part = self.file.maneuvers
+        closed = has_limited_rates(self.model) and part.effort == 0.0
+        return closed and not isinstance(part.pairs, int)
 
     def pairs(self) -> list[Pair]:
         """Trims to join by optimal control; none where maneuvers come at once."""
         if self.at_once or not self.model.reduced_names:
             return []
-        nodes, part = Automaton(self.model, self.trims), self.maneuvers
+        nodes, part = Automaton(self.model, self.trims), self.file.maneuvers
         if isinstance(part.pairs, int):
             return nearest_pairs(nodes, part.pairs, keep_sign=part.keep_sign)
         chosen = neighbour_pairs if part.pairs == "neighbours" else all_pairs
@@ -208,16 +205,8 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     if not found.trims:
         reason = found.missing[0].reason
         raise document.error(("trims",), f"the {model.name} has none of these trims: {reason}")
-    asked = BuildFile(
-        name=file.library,
-        model=model,
-        grid=file.trims,
-        max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
-        trims=_at_rest_once(found.trims),
-        missing=found.missing,
-        maneuvers=file.maneuvers,
-        design=file.design,
-    )
+    trims = _at_rest_once(found.trims)
+    asked = BuildFile(file=file, model=model, trims=trims, missing=found.missing)
     _check_maneuvers(document, asked)
     return asked
 
@@ -242,19 +231,19 @@ def build(
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Automaton, LibraryBuild | None]:
     """The library of a build file, written to `path`, and how it was built if not at once."""
-    part = asked.maneuvers
+    file, part = asked.file, asked.file.maneuvers
     if asked.at_once or not asked.model.reduced_names:
         automaton = Automaton.of_model(
             asked.model,
-            asked.grid,
+            file.trims,
             pairs="neighbours" if part.pairs == "neighbours" else "all",
             late=part.late,
             strokes=part.strokes_m,
             turns=part.turns_rad,
-            max_lateral_acceleration=asked.max_lateral_acceleration,
+            max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
             leave_out=True,
         )
-        automaton = replace(automaton, name=asked.name)
+        automaton = replace(automaton, name=file.library)
         save_library(automaton, path)
         return automaton, None
     done = build_library(
@@ -269,7 +258,7 @@ def build(
         jobs=jobs,
         scheduler=scheduler,
         path=path,
-        name=asked.name,
+        name=file.library,
         progress=progress,
     )
     return done.automaton, done
@@ -277,7 +266,7 @@ def build(
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:
     """Refuse keys that belong to the other method of joining trims."""
-    part, given = asked.maneuvers, asked.maneuvers.model_fields_set
+    part, given = asked.file.maneuvers, asked.file.maneuvers.model_fields_set
     if not asked.at_once:
         for key in ("late", "strokes_m", "turns_rad"):
             if key in given:

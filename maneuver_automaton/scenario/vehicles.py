@@ -362,14 +362,9 @@ def carried_of(part: Any) -> Mapping[str, Any]:
     return {name: body for name, body in bodies.items() if body is not None}
 
 
-def is_known(model: Model) -> bool:
-    """Whether scenario files can state a model; a user's own they can only name."""
-    return model.name in MODELS and is_of_a_kind(model)
-
-
 def described(model: Model) -> dict[str, Any]:
     """What a scenario file says of a model; limits that it does not have are left out."""
-    if not is_known(model):
+    if not is_of_a_kind(model):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
     values = stated(part_of(model.name), model)
     return {"model": model.name} | {
