@@ -16,13 +16,11 @@ from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outli
 from maneuver_automaton.audit.frames import placed
 from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.shapes import (
+    SIDES,
     AnyObstacle,
-    Box,
-    Disc,
-    Obstacle,
     OccupancyMap,
-    Polygon,
     Shape,
+    by_kind,
 )
 
 LOST = 1e-9  # share of an area, that a union may lose
@@ -81,29 +79,24 @@ def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
     return whole[0], whole[1], whole[2], whole[3]
 
 
-def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[Outline, IntArray]:
+def _outlined(solids: tuple[AnyObstacle | Shape, ...], origins: Array) -> tuple[Outline, IntArray]:
     """The outline of solids, counted from origins of their own (n, 2) [m], and whose each edge is.
 
     A map without a blocked cell has no edge, and is no solid.
     """
     nothing = np.zeros(0, dtype=np.complex128)
     found = [(np.zeros(0, dtype=np.int64), nothing, nothing, np.zeros(0))]
-    boxes = [(k, one) for k, one in enumerate(solids) if isinstance(one, Box)]
-    discs = [(k, one) for k, one in enumerate(solids) if isinstance(one, Disc)]
-    polygons = [(k, one) for k, one in enumerate(solids) if isinstance(one, Polygon)]
-    maps = [(k, one) for k, one in enumerate(solids) if isinstance(one, OccupancyMap)]
-    if boxes:
-        numbers = np.array([k for k, _ in boxes])
-        centers = np.concatenate([one.center for _, one in boxes]).reshape(-1, 2) - origins[numbers]
-        sizes = np.concatenate([one.size for _, one in boxes]).reshape(-1, 2, 1)
-        heading = np.array([one.heading for _, one in boxes])[:, None]
-        x, y = sizes[:, 0] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1] * [-0.5, -0.5, 0.5, 0.5]
+    kinds = by_kind(solids)
+    discs, polygons = kinds.discs, kinds.polygons
+    if kinds.boxes.size:
+        centers, heading = kinds.centers - origins[kinds.boxes], kinds.headings[:, None]
+        x, y = kinds.sizes[:, :1] * SIDES[0], kinds.sizes[:, 1:] * SIDES[1]
         cosine, sine = np.cos(heading), np.sin(heading)
         corners = np.empty(x.shape, dtype=np.complex128)
         corners.real = centers[:, :1] + (cosine * x - sine * y)
         corners.imag = centers[:, 1:] + (sine * x + cosine * y)
         both = corners.ravel(), corners[:, [1, 2, 3, 0]].ravel()
-        found.append((numbers.repeat(4), *both, np.zeros(corners.size)))
+        found.append((kinds.boxes.repeat(4), *both, np.zeros(corners.size)))
     if discs:
         numbers = np.array([k for k, _ in discs])
         points = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
@@ -119,7 +112,7 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         numbers = np.array([k for k, _ in rings]).repeat([sum(map(len, some)) for _, some in rings])
         both = _edges([ring for _, some in rings for ring in some])
         found.append((numbers, *both, np.zeros(numbers.size)))
-    for k, one in maps:
+    for k, one in kinds.maps:
         begins, ends, radius, _ = map_outline(one, (float(origins[k, 0]), float(origins[k, 1])))
         found.append((np.full(radius.size, k), begins, ends, radius))
     owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -305,13 +298,12 @@ def surroundings_around(
     given = [one.motion for one in movers]
     motions = [Motion(one.time, one.pose - [*origin, 0.0], one.twist) for one in given]
     heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
-    for k, one in enumerate(obstacles):
-        if isinstance(one, Obstacle) and one.height is not None:
-            heights[k] = one.height
+    for k, height in enumerate([getattr(one, "height", None) for one in obstacles]):
+        if height is not None:
+            heights[k] = height
     number = np.full(len(obstacles), -1)
     number[moving] = np.arange(len(moving))
-    solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
-    whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
+    whole, owners = _outlined(obstacles, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights[owners]
     still, edges = (index < 0).nonzero()[0], (index >= 0).nonzero()[0]
     knots = Knots.of(motions) if motions else NO_KNOTS

@@ -79,7 +79,7 @@ def pieces_seen_from(shapes: tuple[AnyObstacle | Shape, ...], frame: Array) -> C
     for one in (one for _, one in kinds.polygons if one.holes):
         holes = [seen_from(hole, frame) for hole in one.holes]
         found.append(pieces_of(convex_pieces(Polygon(seen_from(one.corners, frame), holes))))
-    if kinds.boxes:
+    if end > begin:
         half, heading = 0.5 * kinds.sizes, kinds.headings - float(frame[2])
         c, s = np.cos(heading), np.sin(heading)
         along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T

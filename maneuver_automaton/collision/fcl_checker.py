@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Shape, box_corners, by_kind
+from maneuver_automaton.collision.shapes import AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
     LEAST_TURN,
@@ -42,6 +42,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
+MOST_NEAR = 64  # parts of coasts, about, around which closed obstacles are laid out
 ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
 GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
@@ -110,7 +111,8 @@ class FclChecker:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
         laid = self._ground.laid
         if not laid.is_whole:
-            laid = self._laid_near(*_coasted_within(here, twists, lasting))
+            around = _boxes_along(self._body, here, twists, lasting)
+            laid = self._ground.near(around + self.proven * np.array([-1.0, -1.0, 1.0, 1.0]))
         return self._first_hit(here, twists, lasting, laid, ask)
 
     def courses_hit(
@@ -257,7 +259,7 @@ class _Laid(NamedTuple):
 class _Ground:
     """Static obstacles, of which FCL is shown those that something came near to."""
 
-    obstacles: tuple[AnyObstacle, ...]
+    kinds: ByKind  # they
     numbers: IntArray  # (n,) of these in the scene
     boxes: Array  # (n, 4) [low x, low y, high x, high y] around them
     excess: float  # [m]
@@ -268,18 +270,18 @@ class _Ground:
         laid = self.laid
         if laid.is_whole:
             return laid
+        if laid.static is not None:  # who comes back is likely to come again: all that is around
+            boxes = np.append(boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0))[None]
         low_x, low_y, high_x, high_y = self.boxes.T[:, :, None]
         meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
         meets &= (high_x >= boxes[:, 0]) & (high_y >= boxes[:, 1])
         rows = laid.rows | meets.any(axis=1)
         if not (rows & ~laid.rows).any():
             return laid
-        which = rows.nonzero()[0]
-        found = tuple(self.obstacles[k] for k in which.tolist())
-        skin, of = obstacle_skin(found, excess=self.excess)
+        skin, of = obstacle_skin(self.kinds, rows, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
-        self.laid = laid = _Laid(rows, static, self.numbers[which][of], bool(rows.all()))
+        self.laid = laid = _Laid(rows, static, self.numbers[of], bool(rows.all()))
         return laid
 
 
@@ -291,34 +293,34 @@ def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
     static = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is None]
-    seen = tuple(obstacles[k] for k in static)
+    seen = tuple([obstacles[k] for k in static])
     if any(origin):
         seen = tuple(one.moved(SE2(np.array([-origin[0], -origin[1], 0.0]))) for one in seen)
     return _Ground(
-        obstacles=seen,
+        kinds=(kinds := by_kind(seen)),
         numbers=np.array(static, dtype=np.int64),
-        boxes=_boxes_around(seen),
+        boxes=_boxes_around(kinds, len(seen)),
         excess=excess,
         laid=_Laid(np.zeros(len(seen), np.bool_), None, np.zeros(0, np.int64), not seen),
     )
 
 
-def _boxes_around(obstacles: tuple[AnyObstacle, ...]) -> Array:
-    """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles."""
-    boxes, kinds = np.zeros((len(obstacles), 4)), by_kind(obstacles)
+def _boxes_around(kinds: ByKind, count: int) -> Array:
+    """Boxes (n, 4) [low x, low y, high x, high y] around so many static obstacles."""
+    boxes = np.zeros((count, 4))
     for k, disc in kinds.discs:
         boxes[k] = *(disc.center - disc.radius), *(disc.center + disc.radius)
     for k, one in kinds.maps:  # wherever it is turned
         far = np.hypot(*one.extent)
         boxes[k] = *(one.origin[:2] - far), *(one.origin[:2] + far)
-    rings = {k: one.corners for k, one in kinds.polygons}
-    rings |= zip(kinds.boxes, box_corners(kinds.centers, kinds.headings, kinds.sizes), strict=True)
-    if rings:
+    boxes[kinds.quads, :2] = kinds.corners.min(axis=1)
+    boxes[kinds.quads, 2:] = kinds.corners.max(axis=1)
+    if rings := {k: one.corners for k, one in kinds.others}:
         begins = [0, *itertools.accumulate(map(len, rings.values()))][:-1]
         corners = np.concatenate(list(rings.values()))
         ends = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
         boxes[list(rings)] = np.concatenate(ends, axis=1)
-    outlines_of([one for _, one in kinds.polygons if not one.is_plain])  # refuses one without area
+    outlines_of([one for _, one in kinds.others if not one.is_plain])  # refuses one without area
     return boxes
 
 
@@ -351,14 +353,22 @@ def _box_skin(ring: Array) -> Skin:
     return Skin(vertices, _BOX)
 
 
-def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Array, Array]:
-    """Corners (n, 2) of boxes around the places of coasts [m]."""
-    # From each place the ways to both ends are together no longer than the coast: an ellipse.
-    lasting = np.minimum(durations, math.tau / np.maximum(np.abs(twists[:, 2]), LEAST_TURN))
-    begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
-    ends = coasted_at(starts, np.array(twists), np.arange(len(starts)), lasting)[:, :2]
-    half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
-    return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
+def _boxes_along(body: GrownBody, starts: Array, twists: Array, durations: Array) -> Array:
+    """Boxes (m, 4) that hold a body along some coasts, each of which is cut into parts."""
+    turns = np.abs(twists[:, 2])
+    lasting = np.minimum(durations, math.tau / np.maximum(turns, LEAST_TURN))
+    far = float(np.hypot(*body.middle)) + body.reach
+    swing = (np.hypot(twists[:, 0], twists[:, 1]) + far * turns) * lasting  # of its points at most
+    step = max(0.5 * body.reach, float(swing.sum()) / MOST_NEAR)
+    count = np.ceil(swing / step).astype(np.int64) + 1
+    of = np.arange(count.size).repeat(count)
+    share = (np.arange(of.size) - (count.cumsum() - count)[of] + 0.5) / count[of]
+    x, y, turn = coasted_at(starts, np.array(twists), of, share * lasting[of]).T
+    c, s, off = np.cos(turn), np.sin(turn), ((0.5 / count + ROUNDED) * swing)[of]
+    (ahead, aside), (length, width) = body.middle, body.half
+    x, wide = x + c * ahead - s * aside, np.abs(c) * length + np.abs(s) * width + off
+    y, high = y + s * ahead + c * aside, np.abs(s) * length + np.abs(c) * width + off
+    return np.stack([x - wide, y - high, x + wide, y + high], axis=1)
 
 
 def _object(skin: Skin) -> Any:

@@ -28,6 +28,7 @@ from maneuver_automaton.collision.geometry import (
 from maneuver_automaton.collision.motion import STANDS, Motion, planar
 from maneuver_automaton.groups import SE2, LieGroup
 
+SIDES = np.array([[-0.5, 0.5, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]])  # of a box, where corners are
 PLAIN = 1e-6  # sine of the angle at a corner, beyond which rounding does not decide its side
 
 
@@ -166,7 +167,7 @@ class Box:
 def box_corners(centers: Array, headings: Array, sizes: Array) -> Array:
     """Corners (n, 4, 2) of boxes [m], as of each, from arrays of what boxes have."""
     cosine, sine = np.cos(headings)[:, None], np.sin(headings)[:, None]
-    x, y = sizes[:, :1] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1:] * [-0.5, -0.5, 0.5, 0.5]
+    x, y = sizes[:, :1] * SIDES[0], sizes[:, 1:] * SIDES[1]
     corners = np.empty((len(centers), 4, 2))
     corners[..., 0] = centers[:, :1] + (cosine * x - sine * y)
     corners[..., 1] = centers[:, 1:] + (sine * x + cosine * y)
@@ -408,28 +409,42 @@ AnyObstacle: TypeAlias = Obstacle | OccupancyMap
 class ByKind(NamedTuple):
     """Shapes by their kinds, each with its number; the boxes in arrays."""
 
-    boxes: list[int]
+    boxes: NDArray[np.int64]  # (n,)
     centers: Array  # (n, 2) [m] of the boxes
     headings: Array  # (n,) [rad]
     sizes: Array  # (n, 2) [m]
     discs: list[tuple[int, Disc]]
     polygons: list[tuple[int, Polygon]]
     maps: list[tuple[int, OccupancyMap]]
+    quads: NDArray[np.int64]  # (m,) the boxes, then the plain polygons of four corners
+    corners: Array  # (m, 4, 2) [m] of these
+    others: list[tuple[int, Polygon]]  # that are not among them
 
 
-@functools.lru_cache(maxsize=32)  # FCL has them as the search does
+@functools.lru_cache(maxsize=32)  # FCL and the audit have them as the search does
 def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
     """Shapes, those of obstacles, and maps by their kinds."""
-    every = [*enumerate(getattr(one, "shape", one) for one in solids)]
-    boxes = [(k, one) for k, one in every if isinstance(one, Box)]
+    every = [*enumerate([getattr(one, "shape", one) for one in solids])]
+    boxes = [one for _, one in every if isinstance(one, Box)]
+    polygons = [(k, one) for k, one in every if isinstance(one, Polygon)]
+    fours = {k: one.corners for k, one in polygons if len(one.corners) == 4 and one.is_plain}
+    # The bytes of many small arrays are put together in a fraction of the time.
+    centers = np.frombuffer(b"".join([one.center.data for one in boxes])).reshape(-1, 2)
+    sizes = np.frombuffer(b"".join([one.size.data for one in boxes])).reshape(-1, 2)
+    headings = np.array([one.heading for one in boxes])
+    numbers = [k for k, one in every if isinstance(one, Box)]
+    corners = [box_corners(centers, headings, sizes), *(ring[None] for ring in fours.values())]
     return ByKind(
-        boxes=[k for k, _ in boxes],
-        centers=np.concatenate([NOWHERE.ravel(), *(one.center for _, one in boxes)]).reshape(-1, 2),
-        headings=np.array([one.heading for _, one in boxes]),
-        sizes=np.concatenate([NOWHERE.ravel(), *(one.size for _, one in boxes)]).reshape(-1, 2),
+        boxes=np.array(numbers, dtype=np.int64),
+        centers=centers,
+        headings=headings,
+        sizes=sizes,
         discs=[(k, one) for k, one in every if isinstance(one, Disc)],
-        polygons=[(k, one) for k, one in every if isinstance(one, Polygon)],
+        polygons=polygons,
         maps=[(k, one) for k, one in every if isinstance(one, OccupancyMap)],
+        quads=np.array([*numbers, *fours], dtype=np.int64),
+        corners=np.concatenate(corners),
+        others=[(k, one) for k, one in polygons if k not in fours],
     )
 
 
