@@ -16,10 +16,10 @@ from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outli
 from maneuver_automaton.audit.frames import placed
 from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.shapes import (
-    SIDES,
     AnyObstacle,
     OccupancyMap,
     Shape,
+    box_corners,
     by_kind,
 )
 
@@ -87,28 +87,26 @@ def _outlined(solids: tuple[AnyObstacle | Shape, ...], origins: Array) -> tuple[
     nothing = np.zeros(0, dtype=np.complex128)
     found = [(np.zeros(0, dtype=np.int64), nothing, nothing, np.zeros(0))]
     kinds = by_kind(solids)
-    discs, polygons = kinds.discs, kinds.polygons
-    if kinds.boxes.size:
-        centers, heading = kinds.centers - origins[kinds.boxes], kinds.headings[:, None]
-        x, y = kinds.sizes[:, :1] * SIDES[0], kinds.sizes[:, 1:] * SIDES[1]
-        cosine, sine = np.cos(heading), np.sin(heading)
-        corners = np.empty(x.shape, dtype=np.complex128)
-        corners.real = centers[:, :1] + (cosine * x - sine * y)
-        corners.imag = centers[:, 1:] + (sine * x + cosine * y)
-        both = corners.ravel(), corners[:, [1, 2, 3, 0]].ravel()
-        found.append((kinds.boxes.repeat(4), *both, np.zeros(corners.size)))
+    discs, others = kinds.discs, kinds.others
+    if kinds.quads.size:
+        corners = kinds.corners - origins[kinds.quads, None]
+        near = kinds.centers - origins[kinds.boxes]  # centers first, so that no digit is lost
+        corners[: len(near)] = box_corners(near, kinds.headings, kinds.sizes)
+        points = points_of(corners)
+        both = points.ravel(), points[:, [1, 2, 3, 0]].ravel()
+        found.append((kinds.quads.repeat(4), *both, np.zeros(points.size)))
     if discs:
         numbers = np.array([k for k, _ in discs])
         points = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
         found.append((numbers, points, points, np.array([one.radius for _, one in discs])))
-    if polygons:
-        rings = [(k, [one.corners - origins[k]]) for k, one in polygons if one.is_plain]
-        others = [(k, one) for k, one in polygons if not one.is_plain]
-        given = [
-            (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
+    if others:
+        rings = [(k, [one.corners - origins[k]]) for k, one in others if one.is_plain]
+        given = {
+            k: (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
             for k, one in others
-        ]
-        rings += zip([k for k, _ in others], _solid_rings(given), strict=True)
+            if not one.is_plain
+        }
+        rings += zip(given, _solid_rings([*given.values()]), strict=True)
         numbers = np.array([k for k, _ in rings]).repeat([sum(map(len, some)) for _, some in rings])
         both = _edges([ring for _, some in rings for ring in some])
         found.append((numbers, *both, np.zeros(numbers.size)))
@@ -304,7 +302,7 @@ def surroundings_around(
     number = np.full(len(obstacles), -1)
     number[moving] = np.arange(len(moving))
     whole, owners = _outlined(obstacles, np.where(number[:, None] < 0, origin, 0.0))
-    index, heights_of = number[owners], heights[owners]
+    index, heights_of = number[owners], heights.take(owners, axis=0)
     still, edges = (index < 0).nonzero()[0], (index >= 0).nonzero()[0]
     knots = Knots.of(motions) if motions else NO_KNOTS
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])

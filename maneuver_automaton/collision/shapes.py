@@ -76,13 +76,8 @@ class Polygon:
 
         Nothing is said of others: those have to be looked at by whoever wants to know.
         """
-        if self.holes or len(self.corners) > 4:
-            return False
-        at = [complex(x, y) for x, y in self.corners.tolist()]
-        sides = [b - a for a, b in zip(at, at[1:] + at[:1], strict=True)]
-        turns = [a.conjugate() * b for a, b in zip(sides, sides[1:] + sides[:1], strict=True)]
-        both = [(turn.imag, PLAIN * abs(turn)) for turn in turns]
-        return all(by > least for by, least in both) or all(-by > least for by, least in both)
+        few = not self.holes and len(self.corners) <= 4
+        return few and bool(_turn_one_way(self.corners[None])[0])
 
     def moved(self, by: LieGroup) -> Polygon:
         """The shape moved by a planar pose."""
@@ -424,28 +419,49 @@ class ByKind(NamedTuple):
 @functools.lru_cache(maxsize=32)  # FCL and the audit have them as the search does
 def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
     """Shapes, those of obstacles, and maps by their kinds."""
-    every = [*enumerate([getattr(one, "shape", one) for one in solids])]
-    boxes = [one for _, one in every if isinstance(one, Box)]
-    polygons = [(k, one) for k, one in every if isinstance(one, Polygon)]
-    fours = {k: one.corners for k, one in polygons if len(one.corners) == 4 and one.is_plain}
+    numbers, boxes = list[int](), list[Any]()
+    discs, polygons = list[tuple[int, Disc]](), list[tuple[int, Polygon]]()
+    maps = list[tuple[int, OccupancyMap]]()
+    for k, one in enumerate(solids):
+        shape = one.shape if isinstance(one, Obstacle) else one
+        if isinstance(shape, Box):
+            numbers.append(k)
+            boxes.append(shape)
+        elif isinstance(shape, Polygon):
+            polygons.append((k, shape))
+        elif isinstance(shape, Disc):
+            discs.append((k, shape))
+        else:
+            maps.append((k, shape))
+    fours = {k: one.corners for k, one in polygons if len(one.corners) == 4 and not one.holes}
+    rings = np.concatenate([NOWHERE, *fours.values()]).reshape(-1, 4, 2)
+    plain = _turn_one_way(rings)
+    quads = {k: True for k, is_plain in zip(fours, plain.tolist(), strict=True) if is_plain}
     # The bytes of many small arrays are put together in a fraction of the time.
-    centers = np.frombuffer(b"".join([one.center.data for one in boxes])).reshape(-1, 2)
-    sizes = np.frombuffer(b"".join([one.size.data for one in boxes])).reshape(-1, 2)
+    centers = np.frombuffer(b"".join([one.center for one in boxes])).reshape(-1, 2)
+    sizes = np.frombuffer(b"".join([one.size for one in boxes])).reshape(-1, 2)
     headings = np.array([one.heading for one in boxes])
-    numbers = [k for k, one in every if isinstance(one, Box)]
-    corners = [box_corners(centers, headings, sizes), *(ring[None] for ring in fours.values())]
     return ByKind(
         boxes=np.array(numbers, dtype=np.int64),
         centers=centers,
         headings=headings,
         sizes=sizes,
-        discs=[(k, one) for k, one in every if isinstance(one, Disc)],
+        discs=discs,
         polygons=polygons,
-        maps=[(k, one) for k, one in every if isinstance(one, OccupancyMap)],
-        quads=np.array([*numbers, *fours], dtype=np.int64),
-        corners=np.concatenate(corners),
-        others=[(k, one) for k, one in polygons if k not in fours],
+        maps=maps,
+        quads=np.array([*numbers, *quads], dtype=np.int64),
+        corners=np.concatenate([box_corners(centers, headings, sizes), rings[plain]]),
+        others=[(k, one) for k, one in polygons if k not in quads],
     )
+
+
+def _turn_one_way(rings: Array) -> NDArray[np.bool_]:
+    """Which rings (m, n, 2) turn to one side at all corners, whatever rounding does."""
+    at, after = rings[..., 0] + 1j * rings[..., 1], np.arange(-1, rings.shape[1] - 1)
+    sides = at - at[:, after]
+    turns = sides[:, after].conj() * sides
+    by, least = turns.imag, PLAIN * np.abs(turns)
+    return np.asarray((by > least).all(axis=1) | (-by > least).all(axis=1))
 
 
 NOWHERE: Array = np.zeros((0, 2))
