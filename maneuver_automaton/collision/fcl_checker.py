@@ -25,10 +25,10 @@ from maneuver_automaton.collision.outline import outlines_of
 from maneuver_automaton.collision.shapes import AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
-    LEAST_TURN,
     STANDING,
     GrownBody,
     Twist,
+    Windows,
     chunks,
     course_boxes,
     cut_where_it_pivots,
@@ -42,8 +42,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
-MOST_NEAR = 64  # parts of coasts, about, around which closed obstacles are laid out
-ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
+ROUNDED = 1e-7  # [m] that a box around a slice may be off
 GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
@@ -109,11 +108,7 @@ class FclChecker:
         lasting = as_array("durations", durations)
         if lasting.size and not lasting.min() >= 0.0:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
-        laid = self._ground.laid
-        if not laid.is_whole:
-            around = _boxes_along(self._body, here, twists, lasting)
-            laid = self._ground.near(around + self.proven * np.array([-1.0, -1.0, 1.0, 1.0]))
-        return self._first_hit(here, twists, lasting, laid, ask)
+        return self._first_hit(here, twists, lasting, None, ask)
 
     def courses_hit(
         self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
@@ -151,7 +146,26 @@ class FclChecker:
     def _laid_near(self, low: Array, high: Array) -> _Laid:
         """Obstacles near the body while its place stays between corners (n, 2 or more) [m]."""
         reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
-        return self._ground.near(np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1))
+        boxes = np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1)
+        return self._ground.near(boxes)[0]
+
+    def _boxes_around(self, starts: Array, twists: Array, parts: Windows, still: IntArray) -> Array:
+        """Boxes (n, 4) that hold the body along slices of coasts, and at places where it stands."""
+        none, middle = np.zeros(still.size), self._body.middle[:, None, None]
+        of, lasts = np.append(parts.coast, still), np.append(parts.lengths, none)
+        begins = np.append(parts.begins, none)
+        ends = coasted_at(starts, twists, np.append(of, of), np.append(begins, begins + lasts))
+        x, y, heading = ends.reshape(2, -1, 3).transpose(2, 0, 1)
+        c, s = np.cos(heading), np.sin(heading)
+        x, y = x + c * middle[0] - s * middle[1], y + s * middle[0] + c * middle[1]
+        length, width = self._body.half.tolist()
+        wide, high = np.abs(c) * length + np.abs(s) * width, np.abs(s) * length + np.abs(c) * width
+        # An arc lies in the triangle of its ends and the point where the tangents there meet.
+        turns, speeds = np.abs(twists[of, 2]) * lasts, np.hypot(twists[of, 0], twists[of, 1])
+        swing = speeds * lasts + (float(np.hypot(*self._body.middle)) + self._body.reach) * turns
+        off = 0.5 * swing * np.tan(0.5 * turns) + self.proven + ROUNDED
+        low = np.minimum(*(x - wide)) - off, np.minimum(*(y - high)) - off
+        return np.stack([*low, np.maximum(*(x + wide)) + off, np.maximum(*(y + high)) + off], 1)
 
     def _first_step_hit(
         self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Callable[[], None]
@@ -192,22 +206,34 @@ class FclChecker:
         return None
 
     def _first_hit(
-        self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
+        self,
+        starts: Array,
+        twists: Array,
+        durations: Array,
+        laid: _Laid | None,
+        ask: Callable[[], None],
     ) -> tuple[int, int] | None:
-        """The first of some coasts that touches a static obstacle, and which."""
-        if laid.static is None:
-            return None
+        """The first of some coasts that touches a static obstacle, and which.
+
+        Without obstacles that are `laid` out, slices that are near to none are not looked at.
+        """
         body, kinds = self._body, [(x, y, turn) for x, y, turn in twists.tolist()]
         coasts = [
             (kind, time if _speed(body, kind) * time > STANDING else 0.0)
             for kind, time in zip(kinds, durations.tolist(), strict=True)
         ]
-        still = [k for k, (_, time) in enumerate(coasts) if not time]
-        first = self._first_pose_hit(starts[still], np.array(still), laid) if still else None
-        parts = windows(coasts)
+        still = np.array([k for k, (_, time) in enumerate(coasts) if not time], dtype=np.int64)
+        parts, twists = windows(coasts), np.array(twists)
+        if laid is None and self._ground.laid.is_whole:  # to ask takes no longer than to sort out
+            laid = self._ground.laid
+        elif laid is None:
+            laid, near = self._ground.near(self._boxes_around(starts, twists, parts, still))
+            parts, still = parts.of(near[: parts.coast.size]), still[near[parts.coast.size :]]
+        if laid.static is None:
+            return None
+        first = self._first_pose_hit(starts[still], still, laid)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
-        twists = np.array(twists)
         while parts.coast.size:
             ask()
             of = parts.coast
@@ -265,24 +291,27 @@ class _Ground:
     excess: float  # [m]
     laid: _Laid
 
-    def near(self, boxes: Array) -> _Laid:
-        """All obstacles that meet one of some boxes (m, 4), and others."""
-        laid = self.laid
-        if laid.is_whole:
-            return laid
-        if laid.static is not None:  # who comes back is likely to come again: all that is around
-            boxes = np.append(boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0))[None]
-        low_x, low_y, high_x, high_y = self.boxes.T[:, :, None]
+    def near(self, boxes: Array) -> tuple[_Laid, NDArray[np.bool_]]:
+        """All obstacles that meet one of some boxes (m, 4), and others; which boxes meet any."""
+        laid, far = self.laid, math.inf
+        low, high = boxes[:, :2].min(axis=0, initial=far), boxes[:, 2:].max(axis=0, initial=-far)
+        around = (self.boxes[:, :2] <= high) & (self.boxes[:, 2:] >= low)
+        some = around.all(axis=1).nonzero()[0]
+        low_x, low_y, high_x, high_y = self.boxes[some].T[:, :, None]
         meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
         meets &= (high_x >= boxes[:, 0]) & (high_y >= boxes[:, 1])
-        rows = laid.rows | meets.any(axis=1)
-        if not (rows & ~laid.rows).any():
-            return laid
+        asked = meets.any(axis=0)
+        missing = some[meets.any(axis=1) & ~laid.rows[some]]
+        if not missing.size:
+            return laid, asked
+        # Who comes back is likely to come again: then all that is around is laid out.
+        rows = laid.rows.copy()
+        rows[missing if laid.static is None else some] = True
         skin, of = obstacle_skin(self.kinds, rows, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
         self.laid = laid = _Laid(rows, static, self.numbers[of], bool(rows.all()))
-        return laid
+        return laid, asked
 
 
 _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
@@ -351,24 +380,6 @@ def _box_skin(ring: Array) -> Skin:
     vertices[:4, :2] = vertices[4:, :2] = ring
     vertices[4:, 2] = 1.0
     return Skin(vertices, _BOX)
-
-
-def _boxes_along(body: GrownBody, starts: Array, twists: Array, durations: Array) -> Array:
-    """Boxes (m, 4) that hold a body along some coasts, each of which is cut into parts."""
-    turns = np.abs(twists[:, 2])
-    lasting = np.minimum(durations, math.tau / np.maximum(turns, LEAST_TURN))
-    far = float(np.hypot(*body.middle)) + body.reach
-    swing = (np.hypot(twists[:, 0], twists[:, 1]) + far * turns) * lasting  # of its points at most
-    step = max(0.5 * body.reach, float(swing.sum()) / MOST_NEAR)
-    count = np.ceil(swing / step).astype(np.int64) + 1
-    of = np.arange(count.size).repeat(count)
-    share = (np.arange(of.size) - (count.cumsum() - count)[of] + 0.5) / count[of]
-    x, y, turn = coasted_at(starts, np.array(twists), of, share * lasting[of]).T
-    c, s, off = np.cos(turn), np.sin(turn), ((0.5 / count + ROUNDED) * swing)[of]
-    (ahead, aside), (length, width) = body.middle, body.half
-    x, wide = x + c * ahead - s * aside, np.abs(c) * length + np.abs(s) * width + off
-    y, high = y + s * ahead + c * aside, np.abs(s) * length + np.abs(c) * width + off
-    return np.stack([x - wide, y - high, x + wide, y + high], axis=1)
 
 
 def _object(skin: Skin) -> Any:
