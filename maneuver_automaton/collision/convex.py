@@ -18,6 +18,7 @@ from maneuver_automaton.collision.shapes import (
     Disc,
     Polygon,
     Shape,
+    box_corners,
     by_kind,
 )
 
@@ -80,11 +81,8 @@ def pieces_seen_from(shapes: tuple[AnyObstacle | Shape, ...], frame: Array) -> C
         holes = [seen_from(hole, frame) for hole in one.holes]
         found.append(pieces_of(convex_pieces(Polygon(seen_from(one.corners, frame), holes))))
     if end > begin:
-        half, heading = 0.5 * kinds.sizes, kinds.headings - float(frame[2])
-        c, s = np.cos(heading), np.sin(heading)
-        along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
-        corners = np.array([-along - aside, along - aside, along + aside, aside - along])
-        boxes = (corners.swapaxes(0, 1) + seen[begin:end, None]).round(DIGITS).reshape(-1, 2)
+        turned = box_corners(seen[begin:end], kinds.headings - frame[2], kinds.sizes)
+        boxes = turned.round(DIGITS).reshape(-1, 2)
         found.append(ConvexPieces(boxes, np.full(end - begin, 4), np.zeros(end - begin)))
     if kinds.discs:
         radius = np.array([one.radius for _, one in kinds.discs])

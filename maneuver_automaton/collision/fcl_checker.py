@@ -14,7 +14,7 @@ import threading
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, ByKind, Shape, by_kind
+from maneuver_automaton.collision.shapes import SIDES, AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
     STANDING,
@@ -44,6 +44,7 @@ from maneuver_automaton.groups._kernels import coasted_at
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # [m] that a box around a slice may be off
 GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
+Ask: TypeAlias = Callable[[], None]  # called again and again; it may raise
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
 
@@ -96,7 +97,7 @@ class FclChecker:
         body_velocities: ArrayLike,
         durations: ArrayLike,
         *,
-        ask: Callable[[], None] = lambda: None,
+        ask: Ask = lambda: None,
     ) -> tuple[int, int] | None:
         """The first of several motions that touches, and which obstacle; None if all are free.
 
@@ -111,7 +112,7 @@ class FclChecker:
         return self._first_hit(here, twists, lasting, None, ask)
 
     def courses_hit(
-        self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
+        self, courses: Sequence[Course], *, ask: Ask = lambda: None
     ) -> tuple[int, int] | None:
         """The first of several courses along which the body touches, and which obstacle.
 
@@ -151,24 +152,23 @@ class FclChecker:
 
     def _boxes_around(self, starts: Array, twists: Array, parts: Windows, still: IntArray) -> Array:
         """Boxes (n, 4) that hold the body along slices of coasts, and at places where it stands."""
-        none, middle = np.zeros(still.size), self._body.middle[:, None, None]
+        none, body = np.zeros(still.size), self._body
         of, lasts = np.append(parts.coast, still), np.append(parts.lengths, none)
         begins = np.append(parts.begins, none)
         ends = coasted_at(starts, twists, np.append(of, of), np.append(begins, begins + lasts))
-        x, y, heading = ends.reshape(2, -1, 3).transpose(2, 0, 1)
-        c, s = np.cos(heading), np.sin(heading)
-        x, y = x + c * middle[0] - s * middle[1], y + s * middle[0] + c * middle[1]
-        length, width = self._body.half.tolist()
-        wide, high = np.abs(c) * length + np.abs(s) * width, np.abs(s) * length + np.abs(c) * width
+        own = (SIDES.T * 2.0 * body.half + body.middle) @ np.array([1.0, 1j])
+        x, y, heading = ends.reshape(2, -1, 3).T
+        seen = (x + 1j * y)[..., None] + np.exp(1j * heading)[..., None] * own
         # An arc lies in the triangle of its ends and the point where the tangents there meet.
         turns, speeds = np.abs(twists[of, 2]) * lasts, np.hypot(twists[of, 0], twists[of, 1])
-        swing = speeds * lasts + (float(np.hypot(*self._body.middle)) + self._body.reach) * turns
+        swing = speeds * lasts + (float(np.hypot(*body.middle)) + body.reach) * turns
         off = 0.5 * swing * np.tan(0.5 * turns) + self.proven + ROUNDED
-        low = np.minimum(*(x - wide)) - off, np.minimum(*(y - high)) - off
-        return np.stack([*low, np.maximum(*(x + wide)) + off, np.maximum(*(y + high)) + off], 1)
+        low = seen.real.min(axis=(1, 2)) - off, seen.imag.min(axis=(1, 2)) - off
+        high = seen.real.max(axis=(1, 2)) + off, seen.imag.max(axis=(1, 2)) + off
+        return np.stack([*low, *high], axis=1)
 
     def _first_step_hit(
-        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Callable[[], None]
+        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Ask
     ) -> tuple[int, int] | None:
         """The first of some steps of courses that touches a static obstacle, and which."""
         if laid.static is None:
@@ -206,12 +206,7 @@ class FclChecker:
         return None
 
     def _first_hit(
-        self,
-        starts: Array,
-        twists: Array,
-        durations: Array,
-        laid: _Laid | None,
-        ask: Callable[[], None],
+        self, starts: Array, twists: Array, durations: Array, laid: _Laid | None, ask: Ask
     ) -> tuple[int, int] | None:
         """The first of some coasts that touches a static obstacle, and which.
 

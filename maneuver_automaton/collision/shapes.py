@@ -419,20 +419,11 @@ class ByKind(NamedTuple):
 @functools.lru_cache(maxsize=32)  # FCL and the audit have them as the search does
 def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
     """Shapes, those of obstacles, and maps by their kinds."""
-    numbers, boxes = list[int](), list[Any]()
-    discs, polygons = list[tuple[int, Disc]](), list[tuple[int, Polygon]]()
-    maps = list[tuple[int, OccupancyMap]]()
-    for k, one in enumerate(solids):
-        shape = one.shape if isinstance(one, Obstacle) else one
-        if isinstance(shape, Box):
-            numbers.append(k)
-            boxes.append(shape)
-        elif isinstance(shape, Polygon):
-            polygons.append((k, shape))
-        elif isinstance(shape, Disc):
-            discs.append((k, shape))
-        else:
-            maps.append((k, shape))
+    every = [getattr(one, "shape", one) for one in solids]
+    numbers = [k for k, one in enumerate(every) if isinstance(one, Box)]
+    boxes: list[Any] = [every[k] for k in numbers]
+    others = [(k, one) for k, one in enumerate(every) if not isinstance(one, Box)]
+    polygons = [(k, one) for k, one in others if isinstance(one, Polygon)]
     fours = {k: one.corners for k, one in polygons if len(one.corners) == 4 and not one.holes}
     rings = np.concatenate([NOWHERE, *fours.values()]).reshape(-1, 4, 2)
     plain = _turn_one_way(rings)
@@ -446,9 +437,9 @@ def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
         centers=centers,
         headings=headings,
         sizes=sizes,
-        discs=discs,
+        discs=[(k, one) for k, one in others if isinstance(one, Disc)],
         polygons=polygons,
-        maps=maps,
+        maps=[(k, one) for k, one in others if isinstance(one, OccupancyMap)],
         quads=np.array([*numbers, *quads], dtype=np.int64),
         corners=np.concatenate([box_corners(centers, headings, sizes), rings[plain]]),
         others=[(k, one) for k, one in polygons if k not in quads],
