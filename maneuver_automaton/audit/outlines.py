@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outline, Points
@@ -229,9 +229,6 @@ def _side(a: Any, b: Any, point: Any) -> Array:
     return np.asarray(((b - a).conjugate() * (point - a)).imag)
 
 
-GRID = 65536.0  # [m] between the places from where obstacles are counted
-
-
 class MovingEdges(NamedTuple):
     """The edges of obstacles that move, and how: one row for each motion."""
 
@@ -267,18 +264,6 @@ class Surroundings:
     still: IntArray  # (k,) numbers of the static edges
     index: EdgeBoxes  # of these; where one of what may be flown over is near, all of its edges are
     rounds: bool  # whether any edge has a radius
-
-
-def origin_of(place: ArrayLike) -> tuple[float, float]:
-    """From where to count so that coordinates near `place` (2 or more) lose no digit.
-
-    Examples
-    --------
-    >>> origin_of([3.0, -4.0]), origin_of([1e9 + 5.0, 0.0])
-    ((0.0, 0.0), (1000013824.0, 0.0))
-    """
-    x, y, *_ = np.asarray(place).tolist()
-    return GRID * round(x / GRID), GRID * round(y / GRID)
 
 
 def surroundings_around(

@@ -43,7 +43,6 @@ from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # [m] that a box around a slice may be off
-GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 Ask: TypeAlias = Callable[[], None]  # called again and again; it may raise
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
@@ -88,7 +87,7 @@ class FclChecker:
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
         here = self._seen("pose", pose)[None]
-        hit = self._first_pose_hit(here, np.zeros(1, dtype=np.int64), self._laid_near(here, here))
+        hit = self._first_hit(here, np.zeros((1, 3)), np.zeros(1), None, lambda: None)
         return None if hit is None else hit[1]
 
     def motions_hit(
@@ -130,11 +129,13 @@ class FclChecker:
             return None
         poses = np.stack([seen[rows], seen[rows + 1]])
         steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
-        far = np.hypot(steps[:, 0], steps[:, 1])[:, None]
+        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
+        far = np.hypot(steps[:, 0], steps[:, 1])[:, None] + reach
         begins = np.flatnonzero(np.diff(number[rows], prepend=-1))
         low = np.minimum.reduceat(poses[0, :, :2] - far, begins)
         high = np.maximum.reduceat(poses[0, :, :2] + far, begins)
-        hit = self._first_step_hit(poses, steps, number[rows], self._laid_near(low, high), ask)
+        laid, _ = self._ground.near(np.concatenate([low, high], axis=1))
+        hit = self._first_step_hit(poses, steps, number[rows], laid, ask)
         return None if hit is None else (int(number[rows[hit[0]]]), hit[1])
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -143,12 +144,6 @@ class FclChecker:
         if any(self.origin):
             near[..., :2] -= self.origin
         return near
-
-    def _laid_near(self, low: Array, high: Array) -> _Laid:
-        """Obstacles near the body while its place stays between corners (n, 2 or more) [m]."""
-        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
-        boxes = np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1)
-        return self._ground.near(boxes)[0]
 
     def _boxes_around(self, starts: Array, twists: Array, parts: Windows, still: IntArray) -> Array:
         """Boxes (n, 4) that hold the body along slices of coasts, and at places where it stands."""
@@ -418,12 +413,3 @@ def _touching(
                     break
                 result = fcl.CollisionResult()
     return hits
-
-
-def origin_near(place: ArrayLike) -> tuple[float, float]:
-    """Where to count from so that coordinates near `place` (2 or more) lose no digit.
-
-    The same for all places of a neighbourhood, so that what is prepared for one serves all.
-    """
-    x, y, *_ = np.asarray(place).tolist()
-    return GRID * round(x / GRID), GRID * round(y / GRID)

@@ -29,6 +29,7 @@ from maneuver_automaton.collision.motion import STANDS, Motion, planar
 from maneuver_automaton.groups import SE2, LieGroup
 
 SIDES = np.array([[-0.5, 0.5, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]])  # of a box, where corners are
+GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 PLAIN = 1e-6  # sine of the angle at a corner, beyond which rounding does not decide its side
 
 
@@ -456,6 +457,20 @@ def _turn_one_way(rings: Array) -> NDArray[np.bool_]:
 
 
 NOWHERE: Array = np.zeros((0, 2))
+
+
+def origin_near(place: ArrayLike) -> tuple[float, float]:
+    """Where to count from so that coordinates near `place` (2 or more) lose no digit.
+
+    The same for all places of a neighbourhood, so that what is prepared for one serves all.
+
+    Examples
+    --------
+    >>> origin_near([3.0, -4.0]), origin_near([1e9 + 5.0, 0.0])
+    ((0.0, 0.0), (1000013824.0, 0.0))
+    """
+    x, y, *_ = np.asarray(place).tolist()
+    return GRID * round(x / GRID), GRID * round(y / GRID)
 
 
 def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
