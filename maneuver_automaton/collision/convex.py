@@ -149,7 +149,8 @@ def solids_of(pieces: ConvexPieces) -> Solids:
     if short.any():
         single = (counts == 1).repeat(counts)
         if not (length[~single] > 0.0).all():  # corners that rounding has made one
-            return solids_of(pieces_of(itertools.starmap(_without_repeats, pieces.each())))
+            kept = [(a[(a != _next(a)).any(axis=1)], a, by) for a, by in pieces.each()]
+            return solids_of(pieces_of((some if len(some) else a[:1], by) for some, a, by in kept))
         length[single], short = 1.0, short & ~single
     normal = edge[:, ::-1] * (1.0, -1.0) / length[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
@@ -160,11 +161,6 @@ def solids_of(pieces: ConvexPieces) -> Solids:
     low, high = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
     edges = np.concatenate([corners, normal, offset[:, None]], axis=1)
     return Solids(edges, first, np.concatenate([low - around, high + around, around], axis=1))
-
-
-def _without_repeats(ring: Array, rounding: float) -> tuple[Array, float]:
-    kept = ring[(ring != _next(ring)).any(axis=1)]
-    return (kept if len(kept) else ring[:1]), float(rounding)
 
 
 def _simple(ring: Array) -> Array:

@@ -174,7 +174,8 @@ class FclChecker:
         while first.size:
             ask()
             rings = course_boxes(self._body, poses, steps, first, last)
-            boxes = [_object(_box_skin(ring)) for ring in rings]
+            lids = [np.column_stack([np.tile(ring, (2, 1)), _LEVELS]) for ring in rings]
+            boxes = [_object(Skin(corners, _BOX)) for corners in lids]
             hits = _touching(boxes, np.zeros((first.size, 3)), laid.static)
             rows = np.fromiter(hits, dtype=np.int64, count=len(hits))
             first, last = first[rows], last[rows]
@@ -304,6 +305,7 @@ class _Ground:
         return laid, asked
 
 
+_LEVELS = np.repeat([0.0, 1.0], 4)  # of the corners of a box
 _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 
 
@@ -362,14 +364,6 @@ def _sliced(body: GrownBody, twist: Twist, level: int) -> tuple[Any, float]:
     step = duration * np.array([twist])
     hulls = swept_hulls(pieces, np.concatenate([np.zeros((1, 3)), SE2.exp(step).pose]), step)
     return _object(body_skin(hulls)), slice_excess(pieces, twist, duration)
-
-
-def _box_skin(ring: Array) -> Skin:
-    """Walls and lid over a rectangle (4, 2), without a search for what they are made of."""
-    vertices = np.zeros((8, 3))
-    vertices[:4, :2] = vertices[4:, :2] = ring
-    vertices[4:, 2] = 1.0
-    return Skin(vertices, _BOX)
 
 
 def _object(skin: Skin) -> Any:

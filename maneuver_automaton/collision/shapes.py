@@ -462,8 +462,6 @@ NOWHERE: Array = np.zeros((0, 2))
 def origin_near(place: ArrayLike) -> tuple[float, float]:
     """Where to count from so that coordinates near `place` (2 or more) lose no digit.
 
-    The same for all places of a neighbourhood, so that what is prepared for one serves all.
-
     Examples
     --------
     >>> origin_near([3.0, -4.0]), origin_near([1e9 + 5.0, 0.0])
