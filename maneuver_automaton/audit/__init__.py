@@ -15,5 +15,4 @@ from maneuver_automaton.audit.judge import audit_plan as audit_plan
 from maneuver_automaton.audit.judge import closest_to as closest_to
 from maneuver_automaton.audit.judge import terminal_error as terminal_error
 from maneuver_automaton.audit.outlines import Surroundings as Surroundings
-from maneuver_automaton.audit.outlines import origin_of as origin_of
 from maneuver_automaton.audit.outlines import surroundings_around as surroundings_around

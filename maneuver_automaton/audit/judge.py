@@ -20,7 +20,6 @@ from maneuver_automaton.audit.outlines import (
     Surroundings,
     body_outline,
     directions,
-    origin_of,
     point_apart,
     points_of,
     surroundings_around,
@@ -30,7 +29,7 @@ from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
 from maneuver_automaton.audit.passages import AuditedBody, EdgePairs, bounds_of
 from maneuver_automaton.audit.places import AGREED, price_again
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
+from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of, origin_near
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import PlaceCost
@@ -200,7 +199,7 @@ def audit_plan(
             off = np.abs(trim.reduced_state - state).max(initial=0.0)
             if off > STATE_TOLERANCE:
                 reasons.append(f"it {what} in trim {trim.name!r}, {off:.3g} off the reduced state")
-    origin = origin_of(goal.pose)
+    origin = origin_near(goal.pose)
     bodies = {"": _body(drive.frames, footprint, plan, goal, body_height)}
     for name, shapes in (parts or {}).items() if obstacles or zones else ():
         bodies[name] = _body(drive.part(name), shapes, plan, goal, body_height)
@@ -326,7 +325,7 @@ def closest_to(
     if not obstacles or first > last:
         return Least(math.inf, math.inf, clock)
     drive = driven(seen_from(plan, goal), model)
-    around = surroundings_of(obstacles, origin_of(goal.pose))
+    around = surroundings_of(obstacles, origin_near(goal.pose))
     found = []
     for name, shapes in {"": footprint, **(parts or {})}.items():
         ask()
@@ -347,7 +346,7 @@ def _body(
     height: tuple[float, float],
 ) -> AuditedBody:
     """A body in the coordinates of obstacles counted from the goal's neighbourhood."""
-    origin, (x, y, _, *higher) = origin_of(goal.pose), goal.pose.tolist()
+    origin, (x, y, _, *higher) = origin_near(goal.pose), goal.pose.tolist()
     return AuditedBody(
         outline=body_outline(shapes),
         frames=frames,

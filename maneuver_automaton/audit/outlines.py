@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outline, Points
@@ -17,12 +17,10 @@ from maneuver_automaton.audit.frames import placed
 from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
-    Box,
-    Disc,
-    Obstacle,
     OccupancyMap,
-    Polygon,
     Shape,
+    box_corners,
+    by_kind,
 )
 
 LOST = 1e-9  # share of an area, that a union may lose
@@ -81,45 +79,38 @@ def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
     return whole[0], whole[1], whole[2], whole[3]
 
 
-def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[Outline, IntArray]:
+def _outlined(solids: tuple[AnyObstacle | Shape, ...], origins: Array) -> tuple[Outline, IntArray]:
     """The outline of solids, counted from origins of their own (n, 2) [m], and whose each edge is.
 
     A map without a blocked cell has no edge, and is no solid.
     """
     nothing = np.zeros(0, dtype=np.complex128)
     found = [(np.zeros(0, dtype=np.int64), nothing, nothing, np.zeros(0))]
-    boxes = [(k, one) for k, one in enumerate(solids) if isinstance(one, Box)]
-    discs = [(k, one) for k, one in enumerate(solids) if isinstance(one, Disc)]
-    polygons = [(k, one) for k, one in enumerate(solids) if isinstance(one, Polygon)]
-    maps = [(k, one) for k, one in enumerate(solids) if isinstance(one, OccupancyMap)]
-    if boxes:
-        numbers = np.array([k for k, _ in boxes])
-        centers = np.concatenate([one.center for _, one in boxes]).reshape(-1, 2) - origins[numbers]
-        sizes = np.concatenate([one.size for _, one in boxes]).reshape(-1, 2, 1)
-        heading = np.array([one.heading for _, one in boxes])[:, None]
-        x, y = sizes[:, 0] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1] * [-0.5, -0.5, 0.5, 0.5]
-        cosine, sine = np.cos(heading), np.sin(heading)
-        corners = np.empty(x.shape, dtype=np.complex128)
-        corners.real = centers[:, :1] + (cosine * x - sine * y)
-        corners.imag = centers[:, 1:] + (sine * x + cosine * y)
-        both = corners.ravel(), corners[:, [1, 2, 3, 0]].ravel()
-        found.append((numbers.repeat(4), *both, np.zeros(corners.size)))
+    kinds = by_kind(solids)
+    discs, others = kinds.discs, kinds.others
+    if kinds.quads.size:
+        corners = kinds.corners - origins[kinds.quads, None]
+        near = kinds.centers - origins[kinds.boxes]  # centers first, so that no digit is lost
+        corners[: len(near)] = box_corners(near, kinds.headings, kinds.sizes)
+        points = points_of(corners)
+        both = points.ravel(), points[:, [1, 2, 3, 0]].ravel()
+        found.append((kinds.quads.repeat(4), *both, np.zeros(points.size)))
     if discs:
         numbers = np.array([k for k, _ in discs])
         points = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
         found.append((numbers, points, points, np.array([one.radius for _, one in discs])))
-    if polygons:
-        rings = [(k, [one.corners - origins[k]]) for k, one in polygons if one.is_plain]
-        others = [(k, one) for k, one in polygons if not one.is_plain]
-        given = [
-            (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
+    if others:
+        rings = [(k, [one.corners - origins[k]]) for k, one in others if one.is_plain]
+        given = {
+            k: (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
             for k, one in others
-        ]
-        rings += zip([k for k, _ in others], _solid_rings(given), strict=True)
+            if not one.is_plain
+        }
+        rings += zip(given, _solid_rings([*given.values()]), strict=True)
         numbers = np.array([k for k, _ in rings]).repeat([sum(map(len, some)) for _, some in rings])
         both = _edges([ring for _, some in rings for ring in some])
         found.append((numbers, *both, np.zeros(numbers.size)))
-    for k, one in maps:
+    for k, one in kinds.maps:
         begins, ends, radius, _ = map_outline(one, (float(origins[k, 0]), float(origins[k, 1])))
         found.append((np.full(radius.size, k), begins, ends, radius))
     owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -238,9 +229,6 @@ def _side(a: Any, b: Any, point: Any) -> Array:
     return np.asarray(((b - a).conjugate() * (point - a)).imag)
 
 
-GRID = 65536.0  # [m] between the places from where obstacles are counted
-
-
 class MovingEdges(NamedTuple):
     """The edges of obstacles that move, and how: one row for each motion."""
 
@@ -278,18 +266,6 @@ class Surroundings:
     rounds: bool  # whether any edge has a radius
 
 
-def origin_of(place: ArrayLike) -> tuple[float, float]:
-    """From where to count so that coordinates near `place` (2 or more) lose no digit.
-
-    Examples
-    --------
-    >>> origin_of([3.0, -4.0]), origin_of([1e9 + 5.0, 0.0])
-    ((0.0, 0.0), (1000013824.0, 0.0))
-    """
-    x, y, *_ = np.asarray(place).tolist()
-    return GRID * round(x / GRID), GRID * round(y / GRID)
-
-
 def surroundings_around(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
 ) -> Surroundings:
@@ -305,14 +281,13 @@ def surroundings_around(
     given = [one.motion for one in movers]
     motions = [Motion(one.time, one.pose - [*origin, 0.0], one.twist) for one in given]
     heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
-    for k, one in enumerate(obstacles):
-        if isinstance(one, Obstacle) and one.height is not None:
-            heights[k] = one.height
+    for k, height in enumerate([getattr(one, "height", None) for one in obstacles]):
+        if height is not None:
+            heights[k] = height
     number = np.full(len(obstacles), -1)
     number[moving] = np.arange(len(moving))
-    solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
-    whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
-    index, heights_of = number[owners], heights[owners]
+    whole, owners = _outlined(obstacles, np.where(number[:, None] < 0, origin, 0.0))
+    index, heights_of = number[owners], heights.take(owners, axis=0)
     still, edges = (index < 0).nonzero()[0], (index >= 0).nonzero()[0]
     knots = Knots.of(motions) if motions else NO_KNOTS
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])

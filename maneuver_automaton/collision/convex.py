@@ -18,6 +18,7 @@ from maneuver_automaton.collision.shapes import (
     Disc,
     Polygon,
     Shape,
+    box_corners,
     by_kind,
 )
 
@@ -79,12 +80,9 @@ def pieces_seen_from(shapes: tuple[AnyObstacle | Shape, ...], frame: Array) -> C
     for one in (one for _, one in kinds.polygons if one.holes):
         holes = [seen_from(hole, frame) for hole in one.holes]
         found.append(pieces_of(convex_pieces(Polygon(seen_from(one.corners, frame), holes))))
-    if kinds.boxes:
-        half, heading = 0.5 * kinds.sizes, kinds.headings - float(frame[2])
-        c, s = np.cos(heading), np.sin(heading)
-        along, aside = half[:, :1] * np.array([c, s]).T, half[:, 1:] * np.array([-s, c]).T
-        corners = np.array([-along - aside, along - aside, along + aside, aside - along])
-        boxes = (corners.swapaxes(0, 1) + seen[begin:end, None]).round(DIGITS).reshape(-1, 2)
+    if end > begin:
+        turned = box_corners(seen[begin:end], kinds.headings - frame[2], kinds.sizes)
+        boxes = turned.round(DIGITS).reshape(-1, 2)
         found.append(ConvexPieces(boxes, np.full(end - begin, 4), np.zeros(end - begin)))
     if kinds.discs:
         radius = np.array([one.radius for _, one in kinds.discs])
@@ -151,7 +149,8 @@ def solids_of(pieces: ConvexPieces) -> Solids:
     if short.any():
         single = (counts == 1).repeat(counts)
         if not (length[~single] > 0.0).all():  # corners that rounding has made one
-            return solids_of(pieces_of(itertools.starmap(_without_repeats, pieces.each())))
+            kept = [(a[(a != _next(a)).any(axis=1)], a, by) for a, by in pieces.each()]
+            return solids_of(pieces_of((some if len(some) else a[:1], by) for some, a, by in kept))
         length[single], short = 1.0, short & ~single
     normal = edge[:, ::-1] * (1.0, -1.0) / length[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
@@ -162,11 +161,6 @@ def solids_of(pieces: ConvexPieces) -> Solids:
     low, high = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
     edges = np.concatenate([corners, normal, offset[:, None]], axis=1)
     return Solids(edges, first, np.concatenate([low - around, high + around, around], axis=1))
-
-
-def _without_repeats(ring: Array, rounding: float) -> tuple[Array, float]:
-    kept = ring[(ring != _next(ring)).any(axis=1)]
-    return (kept if len(kept) else ring[:1]), float(rounding)
 
 
 def _simple(ring: Array) -> Array:

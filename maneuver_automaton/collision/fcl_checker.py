@@ -14,7 +14,7 @@ import threading
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,13 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Shape, box_corners, by_kind
+from maneuver_automaton.collision.shapes import SIDES, AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
-    LEAST_TURN,
     STANDING,
     GrownBody,
     Twist,
+    Windows,
     chunks,
     course_boxes,
     cut_where_it_pivots,
@@ -42,8 +42,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
-ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
-GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
+ROUNDED = 1e-7  # [m] that a box around a slice may be off
+Ask: TypeAlias = Callable[[], None]  # called again and again; it may raise
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
 
@@ -87,7 +87,7 @@ class FclChecker:
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
         here = self._seen("pose", pose)[None]
-        hit = self._first_pose_hit(here, np.zeros(1, dtype=np.int64), self._laid_near(here, here))
+        hit = self._first_hit(here, np.zeros((1, 3)), np.zeros(1), None, lambda: None)
         return None if hit is None else hit[1]
 
     def motions_hit(
@@ -96,7 +96,7 @@ class FclChecker:
         body_velocities: ArrayLike,
         durations: ArrayLike,
         *,
-        ask: Callable[[], None] = lambda: None,
+        ask: Ask = lambda: None,
     ) -> tuple[int, int] | None:
         """The first of several motions that touches, and which obstacle; None if all are free.
 
@@ -108,13 +108,10 @@ class FclChecker:
         lasting = as_array("durations", durations)
         if lasting.size and not lasting.min() >= 0.0:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
-        laid = self._ground.laid
-        if not laid.is_whole:
-            laid = self._laid_near(*_coasted_within(here, twists, lasting))
-        return self._first_hit(here, twists, lasting, laid, ask)
+        return self._first_hit(here, twists, lasting, None, ask)
 
     def courses_hit(
-        self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
+        self, courses: Sequence[Course], *, ask: Ask = lambda: None
     ) -> tuple[int, int] | None:
         """The first of several courses along which the body touches, and which obstacle.
 
@@ -132,11 +129,13 @@ class FclChecker:
             return None
         poses = np.stack([seen[rows], seen[rows + 1]])
         steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
-        far = np.hypot(steps[:, 0], steps[:, 1])[:, None]
+        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
+        far = np.hypot(steps[:, 0], steps[:, 1])[:, None] + reach
         begins = np.flatnonzero(np.diff(number[rows], prepend=-1))
         low = np.minimum.reduceat(poses[0, :, :2] - far, begins)
         high = np.maximum.reduceat(poses[0, :, :2] + far, begins)
-        hit = self._first_step_hit(poses, steps, number[rows], self._laid_near(low, high), ask)
+        laid, _ = self._ground.near(np.concatenate([low, high], axis=1))
+        hit = self._first_step_hit(poses, steps, number[rows], laid, ask)
         return None if hit is None else (int(number[rows[hit[0]]]), hit[1])
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -146,13 +145,25 @@ class FclChecker:
             near[..., :2] -= self.origin
         return near
 
-    def _laid_near(self, low: Array, high: Array) -> _Laid:
-        """Obstacles near the body while its place stays between corners (n, 2 or more) [m]."""
-        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
-        return self._ground.near(np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1))
+    def _boxes_around(self, starts: Array, twists: Array, parts: Windows, still: IntArray) -> Array:
+        """Boxes (n, 4) that hold the body along slices of coasts, and at places where it stands."""
+        none, body = np.zeros(still.size), self._body
+        of, lasts = np.append(parts.coast, still), np.append(parts.lengths, none)
+        begins = np.append(parts.begins, none)
+        ends = coasted_at(starts, twists, np.append(of, of), np.append(begins, begins + lasts))
+        own = (SIDES.T * 2.0 * body.half + body.middle) @ np.array([1.0, 1j])
+        x, y, heading = ends.reshape(2, -1, 3).T
+        seen = (x + 1j * y)[..., None] + np.exp(1j * heading)[..., None] * own
+        # An arc lies in the triangle of its ends and the point where the tangents there meet.
+        turns, speeds = np.abs(twists[of, 2]) * lasts, np.hypot(twists[of, 0], twists[of, 1])
+        swing = speeds * lasts + (float(np.hypot(*body.middle)) + body.reach) * turns
+        off = 0.5 * swing * np.tan(0.5 * turns) + self.proven + ROUNDED
+        low = seen.real.min(axis=(1, 2)) - off, seen.imag.min(axis=(1, 2)) - off
+        high = seen.real.max(axis=(1, 2)) + off, seen.imag.max(axis=(1, 2)) + off
+        return np.stack([*low, *high], axis=1)
 
     def _first_step_hit(
-        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Callable[[], None]
+        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Ask
     ) -> tuple[int, int] | None:
         """The first of some steps of courses that touches a static obstacle, and which."""
         if laid.static is None:
@@ -163,7 +174,8 @@ class FclChecker:
         while first.size:
             ask()
             rings = course_boxes(self._body, poses, steps, first, last)
-            boxes = [_object(_box_skin(ring)) for ring in rings]
+            lids = [np.column_stack([np.tile(ring, (2, 1)), _LEVELS]) for ring in rings]
+            boxes = [_object(Skin(corners, _BOX)) for corners in lids]
             hits = _touching(boxes, np.zeros((first.size, 3)), laid.static)
             rows = np.fromiter(hits, dtype=np.int64, count=len(hits))
             first, last = first[rows], last[rows]
@@ -190,22 +202,29 @@ class FclChecker:
         return None
 
     def _first_hit(
-        self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
+        self, starts: Array, twists: Array, durations: Array, laid: _Laid | None, ask: Ask
     ) -> tuple[int, int] | None:
-        """The first of some coasts that touches a static obstacle, and which."""
-        if laid.static is None:
-            return None
+        """The first of some coasts that touches a static obstacle, and which.
+
+        Without obstacles that are `laid` out, slices that are near to none are not looked at.
+        """
         body, kinds = self._body, [(x, y, turn) for x, y, turn in twists.tolist()]
         coasts = [
             (kind, time if _speed(body, kind) * time > STANDING else 0.0)
             for kind, time in zip(kinds, durations.tolist(), strict=True)
         ]
-        still = [k for k, (_, time) in enumerate(coasts) if not time]
-        first = self._first_pose_hit(starts[still], np.array(still), laid) if still else None
-        parts = windows(coasts)
+        still = np.array([k for k, (_, time) in enumerate(coasts) if not time], dtype=np.int64)
+        parts, twists = windows(coasts), np.array(twists)
+        if laid is None and self._ground.laid.is_whole:  # to ask takes no longer than to sort out
+            laid = self._ground.laid
+        elif laid is None:
+            laid, near = self._ground.near(self._boxes_around(starts, twists, parts, still))
+            parts, still = parts.of(near[: parts.coast.size]), still[near[parts.coast.size :]]
+        if laid.static is None:
+            return None
+        first = self._first_pose_hit(starts[still], still, laid)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
-        twists = np.array(twists)
         while parts.coast.size:
             ask()
             of = parts.coast
@@ -257,32 +276,36 @@ class _Laid(NamedTuple):
 class _Ground:
     """Static obstacles, of which FCL is shown those that something came near to."""
 
-    obstacles: tuple[AnyObstacle, ...]
+    kinds: ByKind  # they
     numbers: IntArray  # (n,) of these in the scene
     boxes: Array  # (n, 4) [low x, low y, high x, high y] around them
     excess: float  # [m]
     laid: _Laid
 
-    def near(self, boxes: Array) -> _Laid:
-        """All obstacles that meet one of some boxes (m, 4), and others."""
-        laid = self.laid
-        if laid.is_whole:
-            return laid
-        low_x, low_y, high_x, high_y = self.boxes.T[:, :, None]
+    def near(self, boxes: Array) -> tuple[_Laid, NDArray[np.bool_]]:
+        """All obstacles that meet one of some boxes (m, 4), and others; which boxes meet any."""
+        laid, far = self.laid, math.inf
+        low, high = boxes[:, :2].min(axis=0, initial=far), boxes[:, 2:].max(axis=0, initial=-far)
+        around = (self.boxes[:, :2] <= high) & (self.boxes[:, 2:] >= low)
+        some = around.all(axis=1).nonzero()[0]
+        low_x, low_y, high_x, high_y = self.boxes[some].T[:, :, None]
         meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
         meets &= (high_x >= boxes[:, 0]) & (high_y >= boxes[:, 1])
-        rows = laid.rows | meets.any(axis=1)
-        if not (rows & ~laid.rows).any():
-            return laid
-        which = rows.nonzero()[0]
-        found = tuple(self.obstacles[k] for k in which.tolist())
-        skin, of = obstacle_skin(found, excess=self.excess)
+        asked = meets.any(axis=0)
+        missing = some[meets.any(axis=1) & ~laid.rows[some]]
+        if not missing.size:
+            return laid, asked
+        # Who comes back is likely to come again: then all that is around is laid out.
+        rows = laid.rows.copy()
+        rows[missing if laid.static is None else some] = True
+        skin, of = obstacle_skin(self.kinds, rows, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
-        self.laid = laid = _Laid(rows, static, self.numbers[which][of], bool(rows.all()))
-        return laid
+        self.laid = laid = _Laid(rows, static, self.numbers[of], bool(rows.all()))
+        return laid, asked
 
 
+_LEVELS = np.repeat([0.0, 1.0], 4)  # of the corners of a box
 _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 
 
@@ -291,34 +314,34 @@ def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
     static = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is None]
-    seen = tuple(obstacles[k] for k in static)
+    seen = tuple([obstacles[k] for k in static])
     if any(origin):
         seen = tuple(one.moved(SE2(np.array([-origin[0], -origin[1], 0.0]))) for one in seen)
     return _Ground(
-        obstacles=seen,
+        kinds=(kinds := by_kind(seen)),
         numbers=np.array(static, dtype=np.int64),
-        boxes=_boxes_around(seen),
+        boxes=_boxes_around(kinds, len(seen)),
         excess=excess,
         laid=_Laid(np.zeros(len(seen), np.bool_), None, np.zeros(0, np.int64), not seen),
     )
 
 
-def _boxes_around(obstacles: tuple[AnyObstacle, ...]) -> Array:
-    """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles."""
-    boxes, kinds = np.zeros((len(obstacles), 4)), by_kind(obstacles)
+def _boxes_around(kinds: ByKind, count: int) -> Array:
+    """Boxes (n, 4) [low x, low y, high x, high y] around so many static obstacles."""
+    boxes = np.zeros((count, 4))
     for k, disc in kinds.discs:
         boxes[k] = *(disc.center - disc.radius), *(disc.center + disc.radius)
     for k, one in kinds.maps:  # wherever it is turned
         far = np.hypot(*one.extent)
         boxes[k] = *(one.origin[:2] - far), *(one.origin[:2] + far)
-    rings = {k: one.corners for k, one in kinds.polygons}
-    rings |= zip(kinds.boxes, box_corners(kinds.centers, kinds.headings, kinds.sizes), strict=True)
-    if rings:
+    boxes[kinds.quads, :2] = kinds.corners.min(axis=1)
+    boxes[kinds.quads, 2:] = kinds.corners.max(axis=1)
+    if rings := {k: one.corners for k, one in kinds.others}:
         begins = [0, *itertools.accumulate(map(len, rings.values()))][:-1]
         corners = np.concatenate(list(rings.values()))
         ends = np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)
         boxes[list(rings)] = np.concatenate(ends, axis=1)
-    outlines_of([one for _, one in kinds.polygons if not one.is_plain])  # refuses one without area
+    outlines_of([one for _, one in kinds.others if not one.is_plain])  # refuses one without area
     return boxes
 
 
@@ -341,24 +364,6 @@ def _sliced(body: GrownBody, twist: Twist, level: int) -> tuple[Any, float]:
     step = duration * np.array([twist])
     hulls = swept_hulls(pieces, np.concatenate([np.zeros((1, 3)), SE2.exp(step).pose]), step)
     return _object(body_skin(hulls)), slice_excess(pieces, twist, duration)
-
-
-def _box_skin(ring: Array) -> Skin:
-    """Walls and lid over a rectangle (4, 2), without a search for what they are made of."""
-    vertices = np.zeros((8, 3))
-    vertices[:4, :2] = vertices[4:, :2] = ring
-    vertices[4:, 2] = 1.0
-    return Skin(vertices, _BOX)
-
-
-def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Array, Array]:
-    """Corners (n, 2) of boxes around the places of coasts [m]."""
-    # From each place the ways to both ends are together no longer than the coast: an ellipse.
-    lasting = np.minimum(durations, math.tau / np.maximum(np.abs(twists[:, 2]), LEAST_TURN))
-    begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
-    ends = coasted_at(starts, np.array(twists), np.arange(len(starts)), lasting)[:, :2]
-    half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
-    return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
 
 
 def _object(skin: Skin) -> Any:
@@ -402,12 +407,3 @@ def _touching(
                     break
                 result = fcl.CollisionResult()
     return hits
-
-
-def origin_near(place: ArrayLike) -> tuple[float, float]:
-    """Where to count from so that coordinates near `place` (2 or more) lose no digit.
-
-    The same for all places of a neighbourhood, so that what is prepared for one serves all.
-    """
-    x, y, *_ = np.asarray(place).tolist()
-    return GRID * round(x / GRID), GRID * round(y / GRID)

@@ -28,6 +28,8 @@ from maneuver_automaton.collision.geometry import (
 from maneuver_automaton.collision.motion import STANDS, Motion, planar
 from maneuver_automaton.groups import SE2, LieGroup
 
+SIDES = np.array([[-0.5, 0.5, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]])  # of a box, where corners are
+GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 PLAIN = 1e-6  # sine of the angle at a corner, beyond which rounding does not decide its side
 
 
@@ -75,13 +77,8 @@ class Polygon:
 
         Nothing is said of others: those have to be looked at by whoever wants to know.
         """
-        if self.holes or len(self.corners) > 4:
-            return False
-        at = [complex(x, y) for x, y in self.corners.tolist()]
-        sides = [b - a for a, b in zip(at, at[1:] + at[:1], strict=True)]
-        turns = [a.conjugate() * b for a, b in zip(sides, sides[1:] + sides[:1], strict=True)]
-        both = [(turn.imag, PLAIN * abs(turn)) for turn in turns]
-        return all(by > least for by, least in both) or all(-by > least for by, least in both)
+        few = not self.holes and len(self.corners) <= 4
+        return few and bool(_turn_one_way(self.corners[None])[0])
 
     def moved(self, by: LieGroup) -> Polygon:
         """The shape moved by a planar pose."""
@@ -166,7 +163,7 @@ class Box:
 def box_corners(centers: Array, headings: Array, sizes: Array) -> Array:
     """Corners (n, 4, 2) of boxes [m], as of each, from arrays of what boxes have."""
     cosine, sine = np.cos(headings)[:, None], np.sin(headings)[:, None]
-    x, y = sizes[:, :1] * [-0.5, 0.5, 0.5, -0.5], sizes[:, 1:] * [-0.5, -0.5, 0.5, 0.5]
+    x, y = sizes[:, :1] * SIDES[0], sizes[:, 1:] * SIDES[1]
     corners = np.empty((len(centers), 4, 2))
     corners[..., 0] = centers[:, :1] + (cosine * x - sine * y)
     corners[..., 1] = centers[:, 1:] + (sine * x + cosine * y)
@@ -408,32 +405,70 @@ AnyObstacle: TypeAlias = Obstacle | OccupancyMap
 class ByKind(NamedTuple):
     """Shapes by their kinds, each with its number; the boxes in arrays."""
 
-    boxes: list[int]
+    boxes: NDArray[np.int64]  # (n,)
     centers: Array  # (n, 2) [m] of the boxes
     headings: Array  # (n,) [rad]
     sizes: Array  # (n, 2) [m]
     discs: list[tuple[int, Disc]]
     polygons: list[tuple[int, Polygon]]
     maps: list[tuple[int, OccupancyMap]]
+    quads: NDArray[np.int64]  # (m,) the boxes, then the plain polygons of four corners
+    corners: Array  # (m, 4, 2) [m] of these
+    others: list[tuple[int, Polygon]]  # that are not among them
 
 
-@functools.lru_cache(maxsize=32)  # FCL has them as the search does
+@functools.lru_cache(maxsize=32)  # FCL and the audit have them as the search does
 def by_kind(solids: tuple[AnyObstacle | Shape, ...]) -> ByKind:
     """Shapes, those of obstacles, and maps by their kinds."""
-    every = [*enumerate(getattr(one, "shape", one) for one in solids)]
-    boxes = [(k, one) for k, one in every if isinstance(one, Box)]
+    every = [getattr(one, "shape", one) for one in solids]
+    numbers = [k for k, one in enumerate(every) if isinstance(one, Box)]
+    boxes: list[Any] = [every[k] for k in numbers]
+    others = [(k, one) for k, one in enumerate(every) if not isinstance(one, Box)]
+    polygons = [(k, one) for k, one in others if isinstance(one, Polygon)]
+    fours = {k: one.corners for k, one in polygons if len(one.corners) == 4 and not one.holes}
+    rings = np.concatenate([NOWHERE, *fours.values()]).reshape(-1, 4, 2)
+    plain = _turn_one_way(rings)
+    quads = {k: True for k, is_plain in zip(fours, plain.tolist(), strict=True) if is_plain}
+    # The bytes of many small arrays are put together in a fraction of the time.
+    centers = np.frombuffer(b"".join([one.center for one in boxes])).reshape(-1, 2)
+    sizes = np.frombuffer(b"".join([one.size for one in boxes])).reshape(-1, 2)
+    headings = np.array([one.heading for one in boxes])
     return ByKind(
-        boxes=[k for k, _ in boxes],
-        centers=np.concatenate([NOWHERE.ravel(), *(one.center for _, one in boxes)]).reshape(-1, 2),
-        headings=np.array([one.heading for _, one in boxes]),
-        sizes=np.concatenate([NOWHERE.ravel(), *(one.size for _, one in boxes)]).reshape(-1, 2),
-        discs=[(k, one) for k, one in every if isinstance(one, Disc)],
-        polygons=[(k, one) for k, one in every if isinstance(one, Polygon)],
-        maps=[(k, one) for k, one in every if isinstance(one, OccupancyMap)],
+        boxes=np.array(numbers, dtype=np.int64),
+        centers=centers,
+        headings=headings,
+        sizes=sizes,
+        discs=[(k, one) for k, one in others if isinstance(one, Disc)],
+        polygons=polygons,
+        maps=[(k, one) for k, one in others if isinstance(one, OccupancyMap)],
+        quads=np.array([*numbers, *quads], dtype=np.int64),
+        corners=np.concatenate([box_corners(centers, headings, sizes), rings[plain]]),
+        others=[(k, one) for k, one in polygons if k not in quads],
     )
 
 
+def _turn_one_way(rings: Array) -> NDArray[np.bool_]:
+    """Which rings (m, n, 2) turn to one side at all corners, whatever rounding does."""
+    at, after = rings[..., 0] + 1j * rings[..., 1], np.arange(-1, rings.shape[1] - 1)
+    sides = at - at[:, after]
+    turns = sides[:, after].conj() * sides
+    by, least = turns.imag, PLAIN * np.abs(turns)
+    return np.asarray((by > least).all(axis=1) | (-by > least).all(axis=1))
+
+
 NOWHERE: Array = np.zeros((0, 2))
+
+
+def origin_near(place: ArrayLike) -> tuple[float, float]:
+    """Where to count from so that coordinates near `place` (2 or more) lose no digit.
+
+    Examples
+    --------
+    >>> origin_near([3.0, -4.0]), origin_near([1e9 + 5.0, 0.0])
+    ((0.0, 0.0), (1000013824.0, 0.0))
+    """
+    x, y, *_ = np.asarray(place).tolist()
+    return GRID * round(x / GRID), GRID * round(y / GRID)
 
 
 def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:

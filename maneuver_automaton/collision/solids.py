@@ -15,18 +15,17 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, outlines_of
 from maneuver_automaton.collision.shapes import (
-    AnyObstacle,
     Box,
+    ByKind,
     Disc,
     Polygon,
     Shape,
-    box_corners,
-    by_kind,
 )
 from maneuver_automaton.groups import SE2
 
@@ -79,28 +78,33 @@ def convex_hull(points: Array) -> Array:
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def obstacle_skin(obstacles: tuple[AnyObstacle, ...], *, excess: float) -> tuple[Skin, IntArray]:
-    """Sheets and posts of obstacles, discs by `excess` [m] too large, and whose triangles are."""
-    kinds = by_kind(obstacles)
-    fours = {k: o.corners for k, o in kinds.polygons if len(o.corners) == 4 and o.is_plain}
-    corners = [box_corners(kinds.centers, kinds.headings, kinds.sizes)] if kinds.boxes else []
-    corners += [one[None] for one in fours.values()]
-    quads = [_on_quads(np.concatenate(corners))] if corners else []
-    others = {k: one for k, one in kinds.polygons if k not in fours}
-    numbers = [*kinds.boxes, *fours, *others, *(k for k, _ in (*kinds.discs, *kinds.maps))]
-    parts = list(_on_polygons(list(others.values())))  # one for each of the rest
-    for _, disc in kinds.discs:
+def obstacle_skin(
+    kinds: ByKind, shown: NDArray[np.bool_], *, excess: float
+) -> tuple[Skin, IntArray]:
+    """Sheets and posts of those obstacles (n,) that are shown, and whose each triangle is.
+
+    Discs are by `excess` [m] too large.
+    """
+    wanted, few = shown.tolist(), shown[kinds.quads]
+    quads = kinds.quads[few].tolist()
+    others = [(k, one) for k, one in kinds.others if wanted[k]]
+    discs = [(k, one) for k, one in kinds.discs if wanted[k]]
+    maps = [(k, one) for k, one in kinds.maps if wanted[k]]
+    parts = list(_on_polygons([one for _, one in others]))  # one for each of the rest
+    for _, disc in discs:
         ring = circumscribed(disc.center, disc.radius, excess)
         first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
         fan = np.stack([first, ring[1:-1], ring[2:]], axis=1)
         parts.append(_on_triangles(fan, np.zeros(1, dtype=np.int64)))
-    for _, one in kinds.maps:
+    for _, one in maps:
         rectangles = blocked_rectangles(one.blocked).astype(np.float64)
         rings = one.resolution * rectangles[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
         parts.append(_on_quads(SE2(one.origin).act(rings)))
-    counts = [len(QUAD)] * (len(kinds.boxes) + len(fours)) + [len(one.triangles) for one in parts]
+    counts = [len(QUAD)] * len(quads) + [len(one.triangles) for one in parts]
+    numbers = [*quads, *(k for k, _ in (*others, *discs, *maps))]
     owners = np.array(numbers, dtype=np.int64).repeat(counts)
-    whole, order = _together([*quads, *parts]), owners.argsort(kind="stable")
+    whole = _together([_on_quads(kinds.corners[few]), *parts])
+    order = owners.argsort(kind="stable")
     return Skin(whole.vertices, whole.triangles[order]), owners[order]
 
 

@@ -130,7 +130,7 @@ def world_of(
     pose = np.array(frame)
     pose.setflags(write=False)
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
-    static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
+    static = tuple([o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None])
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     followed = tuple(_moving_of(obstacle) for obstacle in moving)
     where = followed, pose, present or tuple(one.presence for one in moving), body.reach

@@ -25,7 +25,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.cutting import carried, joined
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
-from maneuver_automaton.collision.fcl_checker import origin_near
+from maneuver_automaton.collision.shapes import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import AnyObstacle, Disc, advancement, fcl_checker, layers
+from maneuver_automaton.collision import AnyObstacle, Disc, advancement, layers, shapes
 from maneuver_automaton.collision import blocked as exactly
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.groups import SE2
@@ -152,7 +152,7 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
         pose[:3],
         time=at,
         margin=problem.margin,
-        origin=fcl_checker.origin_near(pose[:2]),
+        origin=shapes.origin_near(pose[:2]),
     )
 
 

@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit import Audit, StatedPrices, audit_plan, closest_to, origin_of
+from maneuver_automaton.audit import Audit, StatedPrices, audit_plan, closest_to
 from maneuver_automaton.automaton import Automaton, Plan, cutting
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Obstacle, Zone, blocked, fcl_checker
 from maneuver_automaton.collision.layers import Layer, layers_of
+from maneuver_automaton.collision.shapes import origin_near
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.places import Clearance
@@ -170,14 +171,14 @@ def _ask(budget: Budget, needed: float = 0.0) -> None:
 
 def load_checks(problem: Problem, workspace: Workspace) -> None:
     """Prepare what FCL and the audit compare with."""
-    origin = _origin(problem.goals[0])
+    origin = origin_near(problem.goals[0].pose)
     for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
         checker = workspace.checker(
             problem.footprint, layer.obstacles, problem.margin, origin, proven=PROVEN[0]
         )
         checker.lay_all()
     if problem.obstacles:
-        workspace.surroundings(problem.obstacles, origin_of(problem.goals[0].pose))
+        workspace.surroundings(problem.obstacles, origin)
 
 
 @functools.cache
@@ -243,7 +244,7 @@ def _static_hit(
 ) -> str:
     """Which edge hits a static obstacle, or what a zone does not admit, by FCL."""
     workspace = workspace or workspace_of(problem.obstacles)
-    forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
+    forbidden = what_zone_forbids(problem, plan, origin_near(goal.pose)) if problem.zones else ""
     if forbidden or not problem.obstacles:
         return forbidden
     bodies = [("", plan, problem.footprint)]
@@ -256,7 +257,7 @@ def _static_hit(
         for layer in layers:
             for proven in PROVEN:
                 checker = workspace.checker(
-                    shapes, layer.obstacles, problem.margin, _origin(goal), proven=proven
+                    shapes, layer.obstacles, problem.margin, origin_near(goal.pose), proven=proven
                 )
                 hit = _what_hits(checker, moving, layer, problem, budget)
                 if not hit:
@@ -348,10 +349,6 @@ def _rows_within_reach(
     near = layer.clearance(start[3] + altitude, problem.body_height) <= problem.margin + step
     runs = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(np.int8)))
     return [slice(first, last) for first, last in runs.reshape(-1, 2).tolist() if last - first > 1]
-
-
-def _origin(goal: Goal) -> tuple[float, float]:
-    return fcl_checker.origin_near(goal.pose[:2])
 
 
 def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:

@@ -15,8 +15,8 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Box, Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.fcl_checker import origin_near
 from maneuver_automaton.collision.outline import blocked_rectangles
+from maneuver_automaton.collision.shapes import origin_near
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.groups import SE2

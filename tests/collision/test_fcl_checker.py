@@ -239,6 +239,23 @@ def test_the_index_is_that_of_the_obstacle_touched():
         assert motion_hit(checker, [x, y, 0.1], [0.01, 0.0, 0.1], 1.0) == index
 
 
+@pytest.mark.parametrize("name", FOOTPRINTS)
+def test_what_is_laid_out_as_motions_come_near_answers_as_all_of_a_map(name):
+    rng = np.random.default_rng(3)
+    hits = 0
+    for _ in range(12):
+        obstacles = random_scene(rng)
+        one, whole = (FclChecker(FOOTPRINTS[name], obstacles) for _ in range(2))
+        whole.lay_all()
+        for _ in range(3):  # each comes near to others
+            starts = [random_pose(rng) for _ in range(3)]
+            motions = starts, rng.normal(size=(3, 3)) * [[1.0], [1.0], [0.0]], [2.0, 0.0, 1.0]
+            hit = one.motions_hit(*motions)
+            assert hit == whole.motions_hit(*motions)
+            hits += hit is not None
+    assert 0 < hits < 36
+
+
 def test_what_moves_does_not_count():
     motion = Motion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     checker = FclChecker(UNIT, (Obstacle(Disc(1.0), motion=motion),))
