@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,9 @@ KINKED = 1.0 / 3.0  # of what two rules differ by, that the finer one is off at 
 NODES = np.linspace(0.0, 1.0, 5)
 ASIDE = 0.5  # of second differences of nodes, by which a course is off their chords; 0.13 on an arc
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
+
+
+_Known: TypeAlias = dict[int, tuple[Array, Array, Array]]
 
 
 class PlacePrice(NamedTuple):
@@ -119,6 +122,7 @@ class TimedPrices:
         self.piece = np.repeat(stretches.piece, len(GAUSS))
         self.shares = (begin[:, None] + (end - begin)[:, None] * GAUSS).ravel()
         self.weights = ((end - begin)[:, None] * WEIGHTS).ravel()
+        self.known: list[_Known] = [{} for _ in costs]
 
     def at(self, durations: Array) -> tuple[float, Array]:
         """The price, and its derivatives (n,) by the coasting times (n,) [s]."""
@@ -128,8 +132,8 @@ class TimedPrices:
         weights = self.weights * lasting
         spatial = self._spatial(plan)
         price, slopes = 0.0, np.zeros(len(self.timed))
-        for cost in self.costs:
-            motion = _Motion(cost, plan, self.model)
+        for cost, known in zip(self.costs, self.known, strict=True):
+            motion = _Motion(cost, plan, self.model, known)
             poses, twists, states = motion.steps(self.piece, self.shares * lasting)
             rates, moved = motion.slopes(poses, twists, states)
             price += float(weights @ rates)
@@ -158,10 +162,12 @@ class TimedPrices:
 
 
 class _Motion:
-    """Rates along a plan."""
+    """Rates along a plan; `known` keeps what was seen in maneuvers, at times that stay the same."""
 
-    def __init__(self, cost: PlaceCost, plan: Plan, model: Model) -> None:
-        self.cost, self.plan, self.model = cost, plan, model
+    def __init__(
+        self, cost: PlaceCost, plan: Plan, model: Model, known: _Known | None = None
+    ) -> None:
+        self.cost, self.plan, self.model, self.known = cost, plan, model, known
         self.begins = plan.switching_poses
         self.linked = [k for k, one in enumerate(plan.primitives) if not isinstance(one, Trim)]
         dof, n_z = plan.start.size, len(model.reduced_names)
@@ -198,7 +204,11 @@ class _Motion:
         for k in self.linked:
             here = np.flatnonzero(piece == k)
             if here.size:
-                steps[here], twists[here], states[here] = self._along(k, since[here])
+                seen = self.known.get(k) if self.known else None
+                seen = seen or self._along(k, since[here])
+                if self.known is not None:
+                    self.known[k] = seen
+                steps[here], twists[here], states[here] = seen
         return after(self.begins[piece], steps), twists, states
 
     def _along(self, k: int, since: Array) -> tuple[Array, Array, Array]:

@@ -288,7 +288,13 @@ class LatticeWords(PlanningStep):
         if query.problem.place_costs:
             self._go_round()
         own = self.words[-1]  # where others are improved from, too: they lead to other minima
-        if _steered_freely(query.problem) is not None:  # the first word heeded no price
+        if (freely := _steered_freely(query.problem)) is not None:  # the first heeded no price
+            if self.polish:  # whose motion is one maneuver, however many it was made from
+                easy = lattice_query(freely, _goals(query), prepared=query.prepared)
+                part = self._part(STEERED_SHARE, STEERED_SHARE)
+                word = self.words_of(easy, part, known=own, patience=AT_ONCE).word
+                if found.may_check:
+                    found.offer(plan_of_word(query, word), query.goal_index[word.goal])
             self._by_way_of(query, STEERED_SHARE, counted=STEERED_SHARE)
         better = self.words_of(
             query,
@@ -328,6 +334,12 @@ class LatticeWords(PlanningStep):
         most = None if left.expansions is None else int(share * left.expansions)
         return left.part(share)._replace(expansions=most)
 
+    def _part(self, share: float, counted: float) -> Budget:
+        """Shares of the time and of the expansions that are left."""
+        left = self.for_others
+        most = None if left.expansions is None else int(counted * left.expansions)
+        return left.part(share)._replace(expansions=most)
+
     def _let_pass(self) -> None:
         """Note the cheapest path among static obstacles, with rests that let others pass."""
         query, static = self.query, _among_static(self.query)
@@ -359,9 +371,7 @@ class LatticeWords(PlanningStep):
 
     def _by_way_of(self, other: LatticeQuery, share: float, *, counted: float) -> None:
         """Note the word of another query with the same maneuvers, if it costs less than known."""
-        query, left = self.query, self.for_others
-        most = None if left.expansions is None else int(counted * left.expansions)
-        left = left.part(share)._replace(expansions=most)
+        query, left = self.query, self._part(share, counted)
         other = other if self.finds_plans else late_at_first(other)
         word = self.words_of(other, left, patience=AT_ONCE).word
         if word is NO_WORD:

@@ -190,11 +190,11 @@ class Polish(PlanningStep):
 
 
 def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan, int]]:
-    """The cheapest and the quickest plan; where there is none, one that nearly was."""
-    every = [(one.plan, one.goal_index) for one in found.plans]
-    cheapest = sorted(every, key=lambda one: price.of(one[0]))[:1]
-    quickest = sorted(every, key=lambda one: one[0].duration)[:1]
-    known = [*cheapest, *(one for one in quickest if one not in cheapest)]
+    """The cheapest by the price, the quickest, the cheapest; if none, one that nearly was."""
+    every = [(one.plan, one.goal_index) for one in found.plans]  # the cheapest first
+    by_price = sorted(every, key=lambda one: price.of(one[0]))[:1]
+    by_time = sorted(every, key=lambda one: one[0].duration)[:1]
+    known = list({id(one[0]): one for one in (*by_price, *by_time, *every[:1])}.values())
     # One that is late may be made quicker, one maneuver of too many trims, one too fast for a zone
     # slower.
     return known or sorted(found.misfits, key=lambda one: one[0].duration)[:1]

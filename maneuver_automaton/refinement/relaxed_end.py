@@ -181,13 +181,16 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     costs = task.problem.bound_place_costs
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
     known, best = list[float](), (math.inf, begin)
+    valued = dict[bytes, tuple[float, Array]]()  # each iteration is told where it was last asked
 
     def cost(times: Array) -> tuple[float, Array]:
         if places is None:
             return float(rates @ times) / scale, rates / scale
-        price, slopes = places.at(times)
-        value = settled((rates @ times + price) / scale)
-        return float(value), np.round((rates + slopes) / scale, SLOPES)
+        if (at := times.tobytes()) not in valued:
+            price, slopes = places.at(times)
+            value = settled((rates @ times + price) / scale)
+            valued[at] = float(value), np.round((rates + slopes) / scale, SLOPES)
+        return valued[at]
 
     roughly = ROUGHLY * cost(begin)[0] if costs else ACCURACY
 

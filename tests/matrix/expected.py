@@ -78,6 +78,7 @@ LONG_ONE_BY_ONE = {  # with -m slow
     *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
     ("car", "free_heading_among_obstacles"),
     ("car_with_trailer", "planner_with_all"),
+    ("articulated_vehicle", "dear_switch_among_obstacles"),
     ("glider", "heights"),
     ("car", "several_parts"),
     ("grid", "zones_crossed"),

@@ -131,3 +131,5 @@ def test_plans_with_maneuvers_have_slopes_too():
     for k, step in enumerate(1e-4 * np.eye(len(plan.durations))):
         ahead, now = (prices.at(plan.durations + part)[0] for part in (step, 0.0 * step))
         assert slopes[k] == pytest.approx((ahead - now) / 1e-4, abs=0.05 * np.abs(slopes).max())
+    anew = TimedPrices(here.bound_place_costs, plan, here.automaton.model)  # knows no maneuver yet
+    assert anew.at(1.1 * plan.durations)[0] == prices.at(1.1 * plan.durations)[0]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.vehicles import MODELS
@@ -57,23 +58,23 @@ goal: {{pose: [1, 3, 0]}}
 STANDS = 1e-3  # [m/s]
 
 
-def _never() -> Automaton:
-    """The car's library without what turns the wheels while it stands."""
-    library = load_stock_library("second_order_car")
+def _never(vehicle: Vehicle) -> Automaton:
+    """Its library for a model that never turns its wheels, or bends, while it stands."""
+    library = vehicle.automaton
     model = replace(library.model, steering_at_rest=math.inf)  # type: ignore[type-var]
-    courses = {one.name: one.course.reduced_state for one in library.maneuvers if one.course}
-    kept = [one for one in library.maneuvers if _turned(courses[one.name]) == 0.0]
+    courses = [(one, one.course) for one in library.maneuvers if one.course]
+    kept = [one for one, c in courses if _turned(model, c.reduced_state, c.control) == 0.0]
     return Automaton(model, library.trims, kept)
 
 
-def _turned(states: np.ndarray) -> float:
-    """How far [rad] wheels turn between samples of [speed, steering] between which a car stands."""
-    stands = np.abs(states[:, 0]) <= STANDS
-    return float(np.abs(np.diff(states[:, 1]))[stands[1:] & stands[:-1]].sum())
+def _turned(model: Any, states: np.ndarray, controls: np.ndarray) -> float:
+    """How far [rad] it steers between samples between which it stands."""
+    speeds, angles = model.steered(states, controls)
+    return float(np.abs(np.diff(angles))[speeds <= STANDS].sum())
 
 
 def _takes_its_time_to_steer(vehicle: Vehicle) -> bool:
-    return isinstance(vehicle.automaton.model, SecondOrderCar)
+    return hasattr(vehicle.automaton.model, "steering_at_rest")
 
 
 def _stops_and_steers(problem: Problem) -> Problem:
@@ -96,8 +97,9 @@ def no_steering_at_rest(vehicle: Vehicle, engine: Engine) -> None:
         scenario_of_text(FILE.format(model.name), name="cell")
         return
     goal = vehicle.target(pose=[1.0, 3.0, 0.0])
-    never = replace(vehicle, library=_never)
+    never = replace(vehicle, library=functools.partial(_never, vehicle))
     for obstacles in ([], [Disc(0.5, [6.0, 4.0])]):
         result = asked(never, engine, goals=goal, obstacles=obstacles)
-        course = Course.driven(result.plan, model, step_m=0.05)
-        assert _turned(course.state) <= 1e-6, f"they turn at rest by {_turned(course.state):.3g}"
+        seen = Course.driven(result.plan, model, step_m=0.05)
+        turned = _turned(model, seen.state, seen.control)
+        assert turned <= 1e-6, f"they turn at rest by {turned:.3g}"
