@@ -171,6 +171,34 @@ def test_nothing_cheaper_than_a_straight_line_is_left():
     assert (bound.value, bound.optimal) == (8.0, True)
 
 
+SPINNER = ma.SecondOrderUnicycle(
+    max_speed=2.0, max_turn_rate=1.0, max_acceleration=0.5, max_angular_acceleration=10.0
+)
+QUICK = ma.SecondOrderCar(
+    wheelbase=2.5, max_steering=0.5, max_speed=10.0, max_acceleration=1.0, max_steering_rate=10.0
+)
+
+
+@pytest.mark.parametrize(
+    ("model", "goal", "seconds"),
+    [
+        (SPINNER, ma.Goal([0, 0, math.pi / 2]), math.pi / 2 + 0.1),
+        (replace(QUICK, min_speed=-1.0), ma.Goal([-5, 0, 0]), 6.0),
+        (
+            replace(QUICK, max_steering=math.atan(0.5), max_lateral_acceleration=0.5),
+            ma.Goal([0, 10, math.pi], tolerance_m=3.0),
+            (5.0 * math.pi + 2.5) / math.sqrt(2.5) + 0.2 * math.atan(0.5),
+        ),
+    ],
+    ids=["on the spot", "in reverse", "within a lateral limit"],
+)
+def test_what_is_not_driven_at_full_speed_starts_and_stops_sooner(model, goal, seconds):
+    rest = ma.Automaton.of_model(model, {name: [0.0] for name in model.reduced_names})
+    problem = ma.Problem(rest, [0, 0, 0], goal)
+    bound = ma.lower_bound(problem, incumbent=2.0 * seconds, max_work=500_000)
+    assert 0.7 * seconds < bound.value <= seconds * (1.0 + 1e-12)
+
+
 @pytest.mark.slow
 def test_the_bound_of_a_time_counts_slow_reverse_and_a_start_from_rest():
     slow = {"ahead": (2, 0.0), "left": (2, 0.6), "right": (2, -0.6), "back": (-0.5, 0.0)}
