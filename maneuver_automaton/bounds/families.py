@@ -108,11 +108,10 @@ def _families(per_cost: Array, *, gears: bool) -> Families:
             for sign in senses
         ]
     else:
-        rate = float(np.abs(per_cost[:, 2]).max())
-        still = np.zeros((1, 3))
-        parts = [per_cost]
+        rate, parts = float(np.abs(per_cost[:, 2]).max()), [per_cost]
         if gears:  # what drives neither forward nor back is of both
-            parts = [np.vstack([per_cost[sign * per_cost[:, 0] >= 0.0], still]) for sign in senses]
+            own = [per_cost[sign * per_cost[:, 0] >= 0.0] for sign in senses]
+            parts = [np.vstack([one, np.zeros((1, 3))]) for one in own]
         found = [
             [(float(np.hypot(*one)), math.atan2(one[1], one[0]), rate) for one in directions]
             for directions in (_directions(part[:, :2]) for part in parts)
