@@ -98,26 +98,32 @@ def besides(problem: Problem) -> float:
 
 def _families(per_cost: Array, *, gears: bool) -> Families:
     """Families of twists (n, 3) per unit of cost; those with gears are of forward or reverse."""
+    senses = 1.0, -1.0
     if not per_cost[:, 1].any():
         found = [
-            (speed, 0.0 if sign > 0 else math.pi, rate)
-            for sign in (1.0, -1.0)
-            for speed, rate in _corners(sign * per_cost[:, 0], np.abs(per_cost[:, 2]))
+            [
+                (speed, 0.0 if sign > 0 else math.pi, rate)
+                for speed, rate in _corners(sign * per_cost[:, 0], np.abs(per_cost[:, 2]))
+            ]
+            for sign in senses
         ]
     else:
-        rate = float(np.abs(per_cost[:, 2]).max())
+        rate, parts = float(np.abs(per_cost[:, 2]).max()), [per_cost]
+        if gears:  # what drives neither forward nor back is of both
+            own = [per_cost[sign * per_cost[:, 0] >= 0.0] for sign in senses]
+            parts = [np.vstack([one, np.zeros((1, 3))]) for one in own]
         found = [
-            (float(np.hypot(*one)), math.atan2(one[1], one[0]), rate)
-            for one in _directions(per_cost[:, :2])
+            [(float(np.hypot(*one)), math.atan2(one[1], one[0]), rate) for one in directions]
+            for directions in (_directions(part[:, :2]) for part in parts)
         ]
     if gears:
-        rows = [(*one, -1, 0 if math.cos(one[1]) > 0.0 else 1) for one in found]
-        for gear in (0, 1):  # a gear that no motion has may not rise without end
-            if all(row[4] != gear for row in rows):
+        rows = [(*one, -1, gear) for gear, part in enumerate(found) for one in part]
+        for gear, part in enumerate(found):  # a gear that no motion has may not rise without end
+            if not part:
                 rows.append((0.0, 0.0, max(row[2] for row in rows), -1, gear))
         rows.sort(key=lambda row: row[4])
     else:
-        rows = _merged(found)
+        rows = _merged([*itertools.chain(*found)])
     table = np.array(rows, dtype=np.float64)
     return Families(
         speed=table[:, 0].copy(),

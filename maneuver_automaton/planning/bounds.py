@@ -43,10 +43,15 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
         return closed
     per_metre = float((rates[drives] / library.speeds[drives]).min())
     fixed = library.rest_rate * (problem.horizon.time or 0.0) if pads else 0.0
+    disc = fixed + per_metre * _in_the_plane(query)
+    return LowerBound(value=disc, kind="disc") if disc > closed.value else closed
+
+
+def _in_the_plane(query: LatticeQuery) -> float:
+    """Lower bound [m] of the path in the plane."""
     from maneuver_automaton.search.lattice import plane_bound
 
-    disc = fixed + per_metre * plane_bound(query)
-    return LowerBound(value=disc, kind="disc") if disc > closed.value else closed
+    return plane_bound(query)
 
 
 @kept_by_first
@@ -109,7 +114,8 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     """No plan is cheaper: the shortest path, driven from rest to rest at the limits.
 
     A path that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
-    the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
+    the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached; so does a turn on the spot
+    with its own rate and acceleration. On a way a turn may be driven slower than at full speed.
     """
     from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
 
@@ -118,10 +124,22 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     if not (follows_paths(model) and problem.rests_at_both_ends and cost):
         return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(replace(problem, place_costs=()), switch=0.0)
-    bound = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
-    least = bound.value
-    fastest = float(np.abs(model.reduced_limits[0]).max())
-    ramp = fastest / float(model.control_limits[0, 1])
-    duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
-    value = cost.time * duration + cost.length * least * fastest
-    return LowerBound(value=max(known, value), kind=bound.kind if value > known else "distance")
+    spins = not simpler.automaton.body_velocities[:, 0].all()
+    fastest: list[float] = np.abs(model.reduced_limits).max(axis=1).tolist()
+    ramps = (fastest / model.control_limits[:, 1]).tolist()
+
+    def lasting(least: float, ramp: float) -> float:
+        return least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
+
+    def driven(least: float) -> float:
+        return cost.time * lasting(least, ramps[0]) + cost.length * least * fastest[0]
+
+    found = []
+    for goal in simpler.goals:
+        closed = closed_bounds(simpler, goal)
+        turn = closed.pop("turn", 0.0)
+        turned = cost.time * (lasting(turn, ramps[1]) if spins else turn)
+        found.append(max((turned, "turn"), *((driven(b), kind) for kind, b in closed.items())))
+    query = lattice_query(simpler, tuple(range(len(problem.goals))))
+    value, kind = max(min(found), (driven(_in_the_plane(query) / fastest[0]), "disc"))
+    return LowerBound(value=max(known, value), kind=kind if value > known else "distance")

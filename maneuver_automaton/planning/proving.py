@@ -153,7 +153,7 @@ def in_costs(problem: Problem, value: float) -> float:
 class _Ramp:
     """What it costs to start from rest and to stop, on a path of a cost at full speed."""
 
-    seconds: float = 0.0  # greatest speed over greatest acceleration
+    seconds: float = 0.0  # the speed that all limits admit over greatest acceleration
     rate: float = 0.0  # cost per second
     share: float = 0.0  # seconds at full speed for a unit of cost
 
@@ -184,8 +184,9 @@ def _ramp(problem: Problem) -> _Ramp:
     twists = extreme_automaton(problem.automaton).body_velocities
     if cost is None or not cost.time or (twists[:, 0] == 0.0).any():
         return _Ramp()
-    fastest = float(np.abs(twists[:, 0]).max())
-    seconds = fastest / float(model.control_limits[0, 1])
+    speeds = np.abs(twists[:, 0])  # slower in reverse, and in turns within a lateral limit
+    slowest, fastest = float(speeds.min()), float(speeds.max())
+    seconds = slowest / float(model.control_limits[0, 1])
     return _Ramp(seconds, cost.time, 1.0 / (cost.time + cost.length * fastest))
 
 

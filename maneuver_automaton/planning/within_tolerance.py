@@ -86,7 +86,8 @@ class WithinTolerance(PlanningStep):
             ended.why = _why_none(found, results, ends_blocked)
             return
         bound = exact.bound if exact.problem.goals == problem.goals else None
-        ended.bound, ended.nodes = ended.bound or bound or formula_bound(problem), exact.nodes
+        formula = None if problem.has_inertia else formula_bound(problem)  # trims may be slow
+        ended.bound, ended.nodes = ended.bound or bound or formula, exact.nodes
 
 
 def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Unicycle
+from maneuver_automaton.models import SecondOrderUnicycle, Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.within_tolerance import free_aims
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
@@ -125,6 +125,21 @@ def test_a_blocked_goal_is_reached_beside_it():
     assert result.terminal_error.position_m > 0.15
     blocked = replace(near, obstacles=[Disc(0.5, [4.5, 1.0])])
     assert plan(blocked, time_limit=LIMIT).status is PlanStatus.GOAL_BLOCKED
+
+
+def test_trims_that_are_slower_than_the_vehicle_bound_nothing():
+    """Its trims need 14 s to the nearest place within; it accelerates to 1.87 m/s and brakes."""
+    model = SecondOrderUnicycle(
+        max_speed=2.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=10.0
+    )
+    slow = Automaton.of_model(model, {"speed": [0.0, 0.25], "turn_rate": [-1.0, 0.0, 1.0]})
+    goal = Goal([4.0, 0.0, 0.0], tolerance_m=0.5)
+    stones = [Disc(0.1, [4.1, 0.0]), Disc(0.3, [2.0, 0.0])]
+    search = SearchSettings(max_expansions=300, polish=False)
+    body = Disc(0.2)
+    problem = Problem(slow, [0, 0, 0], goal, obstacles=stones, footprint=body, search=search)
+    bound = plan(problem, time_limit=LIMIT).lower_bound
+    assert 0.0 < bound <= 2.0 * 3.5**0.5
 
 
 def test_a_slot_is_found_within_the_tolerance_of_a_blocked_goal():
