@@ -72,10 +72,8 @@ class RoadDrive(Played):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
-        after = [_state_after(self.planner, s.state, s.control) for s in self.steps[-1:]]
-        states = [*(step.state for step in self.steps), *after]
-        states = states or [self.planner.start_state]
-        return self.planner.notes(np.array(states), ticks=self.planner.every)
+        applied = np.array([step.control for step in self.steps]).reshape(-1, 2)
+        return self.planner.notes(np.repeat(applied, self.planner.every, axis=0))
 
     @property
     def cost(self) -> float:
@@ -270,7 +268,7 @@ class RoadPlanResult(Played):
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
         if self.decision is None or self.plan is None:
             return self.planner.scene.notes
-        return self.planner.notes(self.decision.states[: self.decision.lasting + 1])
+        return self.planner.notes(self.decision.controls[: self.decision.lasting])
 
     @property
     def stop(self) -> Plan | None:
