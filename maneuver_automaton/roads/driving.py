@@ -152,8 +152,13 @@ class Driver:
     def step(self, planner: RoadPlanner) -> None:
         """Decide as a planner says, which knows the traffic of now, and drive a step."""
         self.done.append(_step(planner, self.state, tick=self.tick, tail=self.tail))
-        decision = self.done[-1].decision
-        self.state = _state_after(planner, self.state, decision.controls[0])
+        decision, lasting = self.done[-1].decision, [planner.scene.step]
+        course = drive(  # by the model's own equations
+            planner.vehicle.model, self.state[3:], control=decision.controls[:1], durations=lasting
+        )
+        pose = (SE2(self.state[:3]) @ SE2(course.pose[-1])).pose
+        speed, steering = course.reduced_state[-1].tolist()
+        self.state = np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
         self.tick, self.tail = self.tick + planner.every, decision.tail(planner.every)
         self.planner = self.planner.opened(self.state)
 
@@ -209,16 +214,6 @@ def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision |
         solve_s=wall,
         cpu_s=cpu,
     )
-
-
-def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
-    """The state (5,) that a control (2,) leads to in a step, by the model's own equations."""
-    course = drive(
-        planner.vehicle.model, state[3:], control=control[None], durations=[planner.scene.step]
-    )
-    pose = (SE2(state[:3]) @ SE2(course.pose[-1])).pose
-    speed, steering = course.reduced_state[-1].tolist()
-    return np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
 
 
 def _ending(

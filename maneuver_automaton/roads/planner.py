@@ -206,13 +206,12 @@ class RoadPlanner:
 
     def notes(self, controls: Array) -> tuple[str, ...]:
         """What of the file, and of its rules under controls (n, 2) of ticks, is not obeyed."""
-        looks, route, scene = math.ceil(self.tick / LOOK), self.route.lanelets, self.scene
-        wheelbase, look, held = self.vehicle.model.wheelbase, self.tick / looks, np.array(controls)
-        states = _kernels_motion.driven(
-            wheelbase, look, self.start_state, np.repeat(held, looks, axis=0)
-        )
-        times: Array = scene.start.time + look * np.arange(len(states), dtype=np.float64)
-        return (*scene.notes, *broken_rules(self.local, self.vehicle, route, states, times))
+        looks, wheelbase = math.ceil(self.tick / LOOK), self.vehicle.model.wheelbase
+        held, look = np.repeat(controls, looks, axis=0), self.tick / looks
+        states = _kernels_motion.driven(wheelbase, look, self.start_state, held)
+        times: Array = self.scene.start.time + look * np.arange(len(states), dtype=np.float64)
+        rules = broken_rules(self.local, self.vehicle, self.route.lanelets, states, times)
+        return (*self.scene.notes, *rules)
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""
