@@ -97,7 +97,7 @@ class _Agreement:
 
     def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         """Let a vehicle in that holds a plan, if all others say that they know of it."""
-        others = [j for j in self.expected if j != k]
+        others = [j for j in self.expected if j in held]  # who has left since is not asked
         known = [j for j in others if self._say(k, j, "asks")]
         for j in known:
             self.expected[j][k] = [found]

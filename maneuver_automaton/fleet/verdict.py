@@ -241,10 +241,9 @@ def plan_of_motion(
     >>> plan_of_motion(motion, 5.0, levels=climb).end.tolist()
     [2.0, 0.0, 0.0, 9.0]
     """
-    first, last = float(motion.time[0]), float(motion.time[-1])
-    begin, still = min(first, since), np.zeros(3)
+    begin, still = min(float(motion.time[0]), since), np.zeros(3)
     twists = np.array([still, *motion.rates, still])
-    durations = [first - begin, *np.diff(motion.time), max(until - last, 0.0)]
+    durations = np.diff(np.minimum([begin, *motion.time, until], until))
     start = motion.pose[0]
     if levels is not None:
         altitudes = levels.at(motion.time)

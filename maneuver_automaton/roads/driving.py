@@ -72,10 +72,8 @@ class RoadDrive(Played):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
-        after = [_state_after(self.planner, s.state, s.control) for s in self.steps[-1:]]
-        states = [*(step.state for step in self.steps), *after]
-        states = states or [self.planner.start_state]
-        return self.planner.notes(np.array(states), ticks=self.planner.every)
+        applied = np.array([step.control for step in self.steps]).reshape(-1, 2)
+        return self.planner.notes(np.repeat(applied, self.planner.every, axis=0))
 
     @property
     def cost(self) -> float:
@@ -154,8 +152,13 @@ class Driver:
     def step(self, planner: RoadPlanner) -> None:
         """Decide as a planner says, which knows the traffic of now, and drive a step."""
         self.done.append(_step(planner, self.state, tick=self.tick, tail=self.tail))
-        decision = self.done[-1].decision
-        self.state = _state_after(planner, self.state, decision.controls[0])
+        decision, lasting = self.done[-1].decision, [planner.scene.step]
+        course = drive(  # by the model's own equations
+            planner.vehicle.model, self.state[3:], control=decision.controls[:1], durations=lasting
+        )
+        pose = (SE2(self.state[:3]) @ SE2(course.pose[-1])).pose
+        speed, steering = course.reduced_state[-1].tolist()
+        self.state = np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
         self.tick, self.tail = self.tick + planner.every, decision.tail(planner.every)
         self.planner = self.planner.opened(self.state)
 
@@ -213,16 +216,6 @@ def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision |
     )
 
 
-def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
-    """The state (5,) that a control (2,) leads to in a step, by the model's own equations."""
-    course = drive(
-        planner.vehicle.model, state[3:], control=control[None], durations=[planner.scene.step]
-    )
-    pose = (SE2(state[:3]) @ SE2(course.pose[-1])).pose
-    speed, steering = course.reduced_state[-1].tolist()
-    return np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
-
-
 def _ending(
     planner: RoadPlanner, states: Array, *, stood: Sequence[float], reached: bool
 ) -> tuple[str, str]:
@@ -270,7 +263,7 @@ class RoadPlanResult(Played):
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
         if self.decision is None or self.plan is None:
             return self.planner.scene.notes
-        return self.planner.notes(self.decision.states[: self.decision.lasting + 1])
+        return self.planner.notes(self.decision.controls[: self.decision.lasting])
 
     @property
     def stop(self) -> Plan | None:

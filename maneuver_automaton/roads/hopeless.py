@@ -52,10 +52,11 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
         causes.append(("undrivable", f"the model cannot drive it: {said}"))
     if causes:
         return causes[0][0], "; ".join(said for _, said in causes)
-    road = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), -0.5 * vehicle.width)
+    least = min(vehicle.length, vehicle.width)  # across: a body may be wider than it is long
+    road = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), -0.5 * least)
     why = [_never_reached(goal, scene, vehicle, road) for goal in scene.goals]
     if "" in why:
-        shut = _shut_off(scene, vehicle, road)
+        shut = _shut_off(scene, vehicle, road, least)
         why = [said or behind for said, behind in zip(why, shut, strict=True)]
     said = "; ".join(dict.fromkeys(why))
     return None if "" in why else ("missed", f"no goal can be reached: {said}")
@@ -77,7 +78,7 @@ def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
     """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen."""
-    # The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
+    # The middle of the body stays on the `road`, which is by half of its width, or length, smaller.
     model, start = vehicle.model, scene.start
     lasts = goal.time[1] - start.time
     if lasts < -EXACT:
@@ -178,7 +179,7 @@ def _bodies(middles: Array, size: Array) -> Any:
     return shapely.polygons(np.asarray(SE2(middles[:, None]).act(corners)))
 
 
-def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
+def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any, least: float) -> list[str]:
     """Who keeps the middle of a vehicle from each goal, in words; empty where nobody does."""
     walls: dict[str, list[Wall]] = {}
     for one in scene.traffic:
@@ -186,7 +187,7 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
             begin, end = presence_of(one)
             place = one.shape if one.motion is None else one.at(begin)
             radius = place.radius if isinstance(place, Disc) else 0.0
-            grown = shapely.buffer(geometry_of(place), radius + 0.5 * vehicle.width)
+            grown = shapely.buffer(geometry_of(place), radius + 0.5 * least)
             walls.setdefault(one.name, []).append((grown, begin, end))
     met, alone = _met(scene, vehicle, road, walls), dict[str, list[bool]]()
     if all(met):
@@ -194,7 +195,7 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
     empty, whole = _met(scene, vehicle, road, {}), [False for _ in met]
     if not all(empty):
         grown = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), 0.5 * SEAM)
-        whole = _met(scene, vehicle, shapely.buffer(grown, -0.5 * (SEAM + vehicle.width)), {})
+        whole = _met(scene, vehicle, shapely.buffer(grown, -0.5 * (SEAM + least)), {})
     if any(empty):
         alone = {
             name: _met(scene, vehicle, road, {k: v for k, v in walls.items() if k != name})
@@ -205,7 +206,7 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
         names = [name for name, free in alone.items() if free[k]]
         who = f"{' and '.join(names) or 'road users'} leave{'s' if len(names) == 1 else ''}"
         closed = f"{who} no way to it as wide as the vehicle until {goal.time[1]:.6g} s"
-        narrow = f"no way to it is as wide as the vehicle, {vehicle.width:.3g} m"
+        narrow = f"no way to it is as wide as the vehicle, {least:.3g} m"
         if whole[k]:
             narrow += f"; lanelets that are not stated to be neighbours are up to {SEAM:g} m apart"
         said.append("" if met[k] else closed if empty[k] else narrow)

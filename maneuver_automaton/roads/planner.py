@@ -50,6 +50,7 @@ SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while i
 SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
 LONGEST_STOP = 12.0  # [s]
 SLACK = 1.2  # of the last plan's cost: a new plan is polished, too, before it is compared
+LOOK = 0.005  # [s] between two looks at a drive, for rules that it breaks
 PASSES = 2  # of polishing a plan that is kept, in each step
 DIGITS = 9  # of the numbers of a scene [m, rad]
 SEEN_OTHERWISE = 0.05  # [m] by which distances differ of two that both see the other one larger
@@ -203,11 +204,14 @@ class RoadPlanner:
         """What may keep the vehicle from its route, as the end of a sentence."""
         return hindrance(self.route, self.local, self.vehicle)
 
-    def notes(self, states: Array, *, ticks: int = 1) -> tuple[str, ...]:
-        """What of the file, and of its rules on states (n, 5) `ticks` apart, is not obeyed."""
-        times = np.array([self.time_of(k * ticks) for k in range(len(states))])
-        route, scene = self.route.lanelets, self.scene
-        return (*scene.notes, *broken_rules(self.local, self.vehicle, route, states, times))
+    def notes(self, controls: Array) -> tuple[str, ...]:
+        """What of the file, and of its rules under controls (n, 2) of ticks, is not obeyed."""
+        looks, wheelbase = math.ceil(self.tick / LOOK), self.vehicle.model.wheelbase
+        held, look = np.repeat(controls, looks, axis=0), self.tick / looks
+        states = _kernels_motion.driven(wheelbase, look, self.start_state, held)
+        times: Array = self.scene.start.time + look * np.arange(len(states), dtype=np.float64)
+        rules = broken_rules(self.local, self.vehicle, self.route.lanelets, states, times)
+        return (*self.scene.notes, *rules)
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""

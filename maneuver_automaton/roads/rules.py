@@ -135,16 +135,19 @@ def broken_rules(
     scene: RoadScene, vehicle: RoadVehicle, route: Sequence[int], states: Array, times: Array
 ) -> tuple[str, ...]:
     """Limits of speed and closed stop lines that states (n, 5) at times (n,) do not keep."""
-    said = []
+    said, corners = [], np.asarray(vehicle.footprint.corners)
+    bodies = shapely.polygons(np.asarray(SE2(states[:, None, :3]).act(corners)))
     for barrier in barriers(scene, vehicle, route, until=float(times[-1])):
         one, (begin, end) = barrier.stop_line, barrier.time
-        for time, state in zip(times.tolist(), states, strict=True):
-            if barrier.opens_for(vehicle, state[:3], float(state[3])):
-                break
-            if begin < time < end and barrier.from_body(vehicle, state[:3])[0] <= 0.0:
-                why = "closed" if one.phases else "passed without a stop"
-                said.append(f"{one.name}: its line is {why} at {time:.4g} s, where it is crossed")
-                break
+        closed = (begin < times) & (times < end)
+        crossed = closed & shapely.intersects(bodies, shapely.Polygon(barrier.strip.corners))
+        first = int(crossed.argmax())
+        if not crossed.any() or any(
+            barrier.opens_for(vehicle, state[:3], float(state[3])) for state in states[:first]
+        ):
+            continue
+        why = "closed" if one.phases else "passed without a stop"
+        said.append(f"{one.name}: its line is {why} at {times[first]:.4g} s, where it is crossed")
     return (
         *said,
         *_too_fast(scene.lanelets, vehicle.middle_of(states[:, :3]), states[:, 3], times),

@@ -72,8 +72,8 @@ class RoadVehicle:
     ahead: float = 1.42273  # [m] from the rear axle to the middle of the body
     power_speed: float = 7.319  # [m/s] beyond it, what the engine gives falls with speed
     engine: float = 8.0  # [m/s^2] the engine gives up to that speed
-    lateral: float = 5.0  # [m/s^2] across, at most
-    friction: float = 9.0  # [m/s^2] along and across together, at most
+    lateral: float = 5.0  # [m/s^2] across, at most, where maneuvers begin and end
+    friction: float = 9.0  # [m/s^2] along and across together, there; fail-safe stops may take more
 
     __repr__ = brief
 

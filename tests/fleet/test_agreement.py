@@ -109,6 +109,13 @@ def test_who_enters_is_known_to_all_or_waits():
         assert (2 in agreement.expected) is enters
 
 
+def test_who_enters_does_not_wait_for_who_has_left_since():
+    agreement, held, _ = three()
+    agreement.leave(2)
+    assert agreement.enter(2, held[2], {0: held[0]})
+    assert [*agreement.others_of(2)] == [0]
+
+
 def driven_without(*numbers: int, steps: int = 40):
     drops = Drops(*numbers)
     fleet = crossing()

@@ -68,6 +68,14 @@ def test_measured_distances_against_dense_looks(here, parts, there, others):
         assert distance >= 0.99 * apart.min() - 0.02
 
 
+def test_who_is_gone_before_its_motion_is_over_is_met_by_nobody():
+    """One is gone after a second of the four that it drives; another one comes there after two."""
+    gone = course([0.0, 0.0, 0.0], [((0.1, 0.0, 0.0), 4.0)], until=1.0)
+    comes = course([-3.0, 0.0, 0.0], [((1.0, 0.0, 0.0), 4.0)])
+    for ways in ((gone, comes), (comes, gone)):
+        assert nearest(*ways).distance == pytest.approx(1.1, abs=0.02)
+
+
 def test_who_begins_later_stands_at_its_start_until_then():
     """By the kernels and by the audit, in whatever order the two are asked for."""
     passes = course([-6.0, 0.0, 0.0], [((1.0, 0.0, 0.0), 12.0)])

@@ -368,6 +368,17 @@ def test_the_middle_of_who_turns_gets_further_than_the_rear_axle():
     assert road_planner(scene).hopeless() is None
 
 
+def test_who_is_wider_than_long_gets_near_the_end_of_a_road():
+    cart = RoadVehicle(length=1.0, width=2.0, ahead=0.3)
+    scene = RoadScene(
+        name="wide",
+        lanelets=(Lanelet(1, [[0, 2], [40, 2]], [[0, -2], [40, -2]]),),
+        start=RoadStart(middle=[39.0, 0.0, 0.0], speed=1.0),
+        goals=(GoalRegion(places=Box([0.1, 0.1], [39.3, 0.0]), time=(0.3, 0.3)),),
+    )
+    assert road_planner(scene, cart).hopeless() is None
+
+
 def test_a_goal_behind_is_told(tmp_path):
     scene = scene_of(tmp_path, *LANES, problem(x=60.0, goal=goal(place(30.0, 2.0, 10.0))))
     assert road_planner(scene).hindrance == (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +116,10 @@ def test_what_the_start_made_unavoidable_is_noted(tmp_path, drive):
         note.startswith("traffic light 8: its line is closed at") for note in drive(red).notes
     )
     stop = scene_of(tmp_path, *road(SIGN, sign(7, "206"), x=60.0))
-    assert any("stop sign 7: its line is passed without a stop" in n for n in drive(stop).notes)
+    on_it = scene_of(tmp_path, *road(SIGN, sign(7, "206"), x=69.0))  # and past it after a step
+    for scene in (stop, replace(on_it, step=0.5)):
+        said = "stop sign 7: its line is passed without a stop"
+        assert any(said in note for note in drive(scene).notes)
 
 
 @BOTH
