@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton._kernel_list import load_kernels, many_calls_are_expected
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
@@ -49,7 +49,7 @@ def load_search(problem: Problem) -> None:
     if all(_suits_words(problem, goal) for goal in problem.goals):
         load_kernels("words")
         library = moving_trims(problem.automaton, problem.cost)
-        if problem.horizon.time is None:
+        if problem.horizon.time is None and many_calls_are_expected():
             momenta_of(library)
         if len(problem.automaton) > LARGE:
             tables(library, free_heading=problem.goals[0].free_heading)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import many_calls_are_expected
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Problem
@@ -277,7 +278,7 @@ class WordScan:
         prices = np.full(tables.paces.shape, np.inf)  # where a trim makes no metre, or no radian
         np.divide(rates[:, None], tables.paces, out=prices, where=tables.paces > 0.0)
         tabled = not (met or pad or setup.free_heading) and self.most == 4 and len(links.cost) == 1
-        momenta = momenta_of(setup.library) if tabled else NONE
+        momenta = momenta_of(setup.library) if tabled and many_calls_are_expected() else NONE
         gears = terms.direction_change if terms and len(links.cost) == 1 else 0.0
         problem = WordProblem(
             library=TimesProblem(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from maneuver_automaton._kernel_list import expect_many_calls
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.momenta import NONE, momenta_of
@@ -18,6 +19,7 @@ COST = Cost(effort=1.0, time=1.0)
 @compiled_only
 @pytest.mark.parametrize("seed", range(8))
 def test_nothing_asked_for_is_left_out(seed):
+    expect_many_calls()
     rng = np.random.default_rng(seed)
     controls = {"on": (1.5, 0.0), "left": (-0.25, 1.0), "right": (-0.25, -1.0), "spin": (0.0, 1.0)}
     if seed % 2:  # straights both ways, and turns of any radius
