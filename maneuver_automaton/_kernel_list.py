@@ -81,12 +81,17 @@ def load_kernels(*uses: str) -> None:
     """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
     _asked.update(uses)
     for use in uses:
-        _load(use, "numba" in sys.modules)
+        _load(use, many_calls_are_expected())
 
 
 def expect_many_calls() -> None:
     """Go over to numba, which tells types of arguments sooner, once and before a clock runs."""
     importlib.import_module("numba")
+
+
+def many_calls_are_expected() -> bool:
+    """Whether what saves a moment of every call is worth to be worked out."""
+    return "numba" in sys.modules
 
 
 def kernel_names() -> list[str]:

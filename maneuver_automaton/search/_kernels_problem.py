@@ -49,12 +49,21 @@ class WordTerms(NamedTuple):
     shortest: float  # [s] a shorter coasting time is not admitted
 
 
+class Momenta(NamedTuple):
+    """Bounds of what is locally optimal in words of four trims; see `momenta`."""
+
+    rows: IntArray  # (M ** 4, 2) the rows of each word, from and to; 1 and 0 if not known
+    whole: Array  # (R, 3) of all cells of a row: least and most that has to be met, least cost
+    cells: Array  # (R, N, 7) the same for each cell, and from where to where the outer trims lead
+
+
 class ScanSettings(NamedTuple):
     """How closely the free time of a word is looked at."""
 
     nodes: int  # of the grid
     slack: float  # share by which a grid node may cost more than the upper bound, and be looked at
     tolerance: float  # of the steering function, relative
+    momenta: Momenta
 
 
 @by_value

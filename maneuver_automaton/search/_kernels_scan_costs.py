@@ -13,6 +13,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose
+from maneuver_automaton.search._kernels_cell_turns import FULL, TINY, least_turn
 from maneuver_automaton.search._kernels_problem import (
     AIM,
     FIRST,
@@ -24,6 +25,7 @@ from maneuver_automaton.search._kernels_problem import (
     word_extra,
 )
 from maneuver_automaton.search._kernels_triple import solve_triple
+from maneuver_automaton.words._kernels_steering import phase, unit
 
 NONE_LEFT = 1e-9  # [m] that only rounding leaves
 
@@ -93,6 +95,59 @@ def any_node_may_do(
             return True
         before = lacks
     return False
+
+
+@bare_inner_kernel
+def may_be_optimal(problem: WordProblem, word: IntArray, number: int, upper_bound: float) -> bool:
+    """Whether the word of a number, of four trims, may be locally optimal below `upper_bound`."""
+    # Its momentum lies in a cell of one of its rows: there start and goal alone decide what has to
+    # be met, and the cost is at least that of the trims between and of the turns and ways outside.
+    known = problem.scan.momenta
+    if problem.library.targets.size > 0 or upper_bound == np.inf or known.cells.shape[0] == 0:
+        return True
+    if known.rows[number, 0] > known.rows[number, 1]:
+        return True
+    most = upper_bound + TINY * (1.0 + abs(upper_bound))
+    most -= problem.terms.pad_cost + word_extra(problem, word, 4)
+    one, other = problem.library.twists[word[0]], problem.library.twists[word[3]]
+    goal, facing = problem.library.goal, unit(problem.library.goal[2])
+    way = complex(goal[0], goal[1])  # from the centre of the first trim to that of the last one
+    if one[2] != 0.0:
+        way -= 1j * one[0] / one[2]
+    if other[2] != 0.0:
+        way += 1j * other[0] / other[2] * facing
+    if one[2] != 0.0 and other[2] != 0.0:
+        aim = phase(way)
+        met, first, last = way.real * way.real + way.imag * way.imag, aim, goal[2] - aim
+    elif one[2] != 0.0:
+        way *= facing.conjugate()
+        met, first, last = way.imag, goal[2], way.real
+    elif other[2] != 0.0:
+        met, first, last = way.imag, way.real, goal[2]
+    else:
+        met, first, last = goal[2] - FULL * math.floor(goal[2] / FULL), 0.0, 0.0
+    for k in range(known.rows[number, 0], known.rows[number, 1]):
+        if not known.whole[k, 0] <= met <= known.whole[k, 1] or known.whole[k, 2] >= most:
+            continue
+        for j in range(known.cells.shape[1]):
+            cell = known.cells[k, j]
+            if not cell[0] <= met <= cell[1] or cell[2] >= most:
+                continue
+            cost = cell[2] + least_alone(problem, word[0], first + cell[3], first + cell[4])
+            if cost + least_alone(problem, word[3], last + cell[5], last + cell[6]) < most:
+                return True
+    return False
+
+
+@bare_inner_kernel
+def least_alone(problem: WordProblem, trim: int, low: float, high: float) -> float:
+    """Least cost of a trim that turns by an angle, or goes a way, from `low` to `high`."""
+    v, w = problem.library.twists[trim, 0], problem.library.twists[trim, 2]
+    if w != 0.0:
+        return problem.library.rates[trim] / abs(w) * least_turn(low, high, w)
+    if v < 0.0:
+        low, high = -high, -low
+    return problem.library.rates[trim] / abs(v) * max(low, 0.0) if high >= 0.0 else math.inf
 
 
 @bare_inner_kernel

@@ -261,6 +261,8 @@ def bisect(
     middle, least, greatest = room.work[0], room.work[1], room.work[2]
     top, m = 0, problem.library.targets.size
     span = room.span[:m]
+    for r in range(m - 1):  # all but the last are met by whoever refines what is proposed
+        span[r, 0], span[r, 1] = -np.inf, np.inf
     while top >= 0:
         low, high = lows[top], highs[top]
         value_low, value_high, bend, depth = (
@@ -286,7 +288,8 @@ def bisect(
             at_high = condition(problem, word, n, m - 1, high)
             change = abs(at_high - at_low)
             wide = bend if bend < np.inf else 1e300
-            span[0, 0], span[0, 1] = min(at_low, at_high) - wide, max(at_low, at_high) + wide
+            span[m - 1, 0] = min(at_low, at_high) - wide
+            span[m - 1, 1] = max(at_low, at_high) + wide
             for i in range(n):
                 middle[i] = 0.5 * (low[i] + high[i])
             settled = bend <= 0.5 * change
@@ -298,7 +301,7 @@ def bisect(
             if bend > 0.0:  # that was with room for the bend: only what is left counts
                 candidates.counter[0] = before
                 if possible and (settled or depth >= 8.0):
-                    span[0, 0], span[0, 1] = min(at_low, at_high), max(at_low, at_high)
+                    span[m - 1, 0], span[m - 1, 1] = min(at_low, at_high), max(at_low, at_high)
                     levels(problem, candidates, word, n, middle, least, greatest, span)
         if not possible or depth >= 8.0 or (settled and bend <= 0.25 * change):
             continue

@@ -36,7 +36,7 @@ from maneuver_automaton.search._kernels_problem import (
     transitions_cost,
     word_extra,
 )
-from maneuver_automaton.search._kernels_scan_costs import any_node_may_do
+from maneuver_automaton.search._kernels_scan_costs import any_node_may_do, may_be_optimal
 from maneuver_automaton.search._kernels_scan_one import scan_one
 from maneuver_automaton.search._kernels_triple import choose_triple, levels, solve_triple
 from maneuver_automaton.words._kernels_steering import phase, unit
@@ -333,6 +333,9 @@ def propose_words(
                 counter[1] += 1
                 continue
             look(problem, links, seen, word, n, rows)
+        elif n == 4 and not may_be_optimal(problem, word, number, upper_bound):
+            counter[1] += 1
+            continue
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
         if flat:
             if spans > 0:

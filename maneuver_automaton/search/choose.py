@@ -20,12 +20,13 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton._kernel_list import load_kernels, many_calls_are_expected
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import free_insertion, linked_insertion
 from maneuver_automaton.search.limits import sole_shortest, three_are_enough
+from maneuver_automaton.search.momenta import momenta_of
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
 from maneuver_automaton.search.word_scan import MOST_TRIMS, tables
@@ -47,8 +48,10 @@ def load_search(problem: Problem) -> None:
         return
     if all(_suits_words(problem, goal) for goal in problem.goals):
         load_kernels("words")
+        library = moving_trims(problem.automaton, problem.cost)
+        if problem.horizon.time is None and many_calls_are_expected():
+            momenta_of(library)
         if len(problem.automaton) > LARGE:
-            library = moving_trims(problem.automaton, problem.cost)
             tables(library, free_heading=problem.goals[0].free_heading)
     else:
         load_kernels("words", "linked words", "insertion")

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import many_calls_are_expected
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Problem
@@ -34,6 +35,7 @@ from maneuver_automaton.search._kernels_problem import (
     WordTerms,
 )
 from maneuver_automaton.search._kernels_scan_one import LEAST_NODES
+from maneuver_automaton.search.momenta import NONE, momenta_of
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import Columns, SearchSetup, columns
 from maneuver_automaton.words._kernels_times import TimesProblem
@@ -275,6 +277,8 @@ class WordScan:
         rates = kept.rates - rest_rate * kept.weights if rest_rate else kept.rates
         prices = np.full(tables.paces.shape, np.inf)  # where a trim makes no metre, or no radian
         np.divide(rates[:, None], tables.paces, out=prices, where=tables.paces > 0.0)
+        tabled = not (met or pad or setup.free_heading) and self.most == 4 and len(links.cost) == 1
+        momenta = momenta_of(setup.library) if tabled and many_calls_are_expected() else NONE
         gears = terms.direction_change if terms and len(links.cost) == 1 else 0.0
         problem = WordProblem(
             library=TimesProblem(
@@ -303,7 +307,7 @@ class WordScan:
                 more_turns=int((self.horizon.time is not None and not self.spare) or setup.climbs),
                 shortest=setup.shortest,
             ),
-            scan=ScanSettings(nodes=self.nodes, slack=self.slack, tolerance=TOLERANCE),
+            scan=ScanSettings(self.nodes, self.slack, TOLERANCE, momenta),
             tail=len(rates) - 1 if setup.free_heading else -1,
         )
         tail, trims = int(setup.free_heading), len(setup.library.trims)

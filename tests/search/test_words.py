@@ -24,6 +24,7 @@ from tests.search.cases import (
     compiled_only,
     end_off_goal,
     helicopter,
+    lasting,
     names,
     parking,
     reference_word,
@@ -395,6 +396,17 @@ def test_too_many_trims_are_refused(problem, most):
     message = rf"max_trims is \d+, need at most {most}; use insertion for more"
     with pytest.raises(ValueError, match=message):
         search(problem)
+
+
+@compiled_only
+@pytest.mark.parametrize("word", ["ahead right left sink", "left ahead right sink"])
+def test_a_climb_and_a_fixed_time_are_both_met(word):
+    trims = [helicopter()[name] for name in word.split()]
+    known = Plan(np.zeros(4), trims, durations=[0.4, 1.2, 0.5, 0.8])
+    horizon = Horizon(time=known.duration, max_trims=4)
+    problem = Problem(helicopter(), np.zeros(4), known.end, horizon=horizon, cost=MINIMUM_TIME)
+    found = [lasting(one) for one in search(problem, alternatives=None).solutions]
+    assert any(len(times) == 4 and np.allclose(times, known.durations) for _, times in found)
 
 
 def test_start_equal_to_goal():
