@@ -14,6 +14,10 @@ from typing import Any
 
 _IMPORT = re.compile(r"^(?:    )?from (\S+) import \(?\s*(\w+) as \2\b", re.MULTILINE)
 _ONE_AT_A_TIME = threading.RLock()
+UNASKED = {  # of other packages, which import them as modules: texts for `help`, tables, dates
+    *("PIL.ExifTags", "fontTools.agl", "matplotlib.category", "matplotlib.dates"),
+    *("numpy._core._add_newdocs", "numpy._core._add_newdocs_scalars"),
+}
 
 
 def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -54,7 +58,7 @@ def _named(package: ModuleType, homes: dict[str, str], name: str) -> Any:
 
 
 class LaterFinder:
-    """Finds modules of this package, which run when they are asked for a name, and no sooner.
+    """Finds modules, above all of this package, which run when asked for a name, and no sooner.
 
     So a program does not run what it only might call: ``from package import module`` runs neither;
     ``module.name`` and ``from module import name`` run the module, and no package on the way.
@@ -64,8 +68,8 @@ class LaterFinder:
     def find_spec(
         name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Where a module of this package is; None of others."""
-        if not name.startswith(f"{__package__}."):
+        """Where a module is that is put off; None of others."""
+        if not name.startswith(f"{__package__}.") and name not in UNASKED:
             return None
         spec = PathFinder.find_spec(name, path, target)
         if spec is not None and spec.loader is not None:

@@ -100,6 +100,8 @@ for name in "planning.unheard", "planning.plan.unheard", "receding_horizon.unhea
     else:
         raise AssertionError(name)
 assert receding_horizon.Step.__module__ == "maneuver_automaton.receding_horizon.log"
+from PIL import ExifTags, Image  # which asks for a tag of photographs alone
+assert type(ExifTags).__name__ == "LaterModule" and Image.ExifTags.Base.Make == 271
 """
     assert "maneuver_automaton.planning.plan" in modules_after(code)
 
