@@ -10,6 +10,8 @@ upper bound has no solution that counts, and a word all of whose cells are such 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -99,13 +101,18 @@ def closed_form(
     r_a, r_b, r_c = radius(twists[a]), radius(twists[b]), radius(twists[c])
     at_1, at_2, facing = r_a - r_b, r_b - r_c, unit(goal[2])
     d = complex(goal[0], goal[1]) + r_a - r_c * facing
-    centre, arm = d, 0j
-    if q < triple[0] and w_q != 0.0:
-        r_q = radius(twists[free])
-        centre, arm = d - r_a + r_q, r_a - r_q
     place = 0
     while place < 3 and q > triple[place]:
         place += 1
+    centre, arm, r_q = d, 0j, radius(twists[free])
+    if w_q != 0.0 and place == 0:
+        centre, arm = d - r_a + r_q, r_a - r_q
+    elif w_q != 0.0 and place == 1:
+        centre, arm = r_a - r_q, r_q - r_b
+    elif w_q != 0.0 and place == 2:
+        centre, arm = r_b - r_q, r_q - r_c
+    elif w_q != 0.0:
+        centre, arm = d + (r_c - r_q) * facing, (r_q - r_c) * facing
     left, right, straight = UNKNOWN, UNKNOWN, 0j
     for i in range(4):
         rate, turn_rate = rates[word[i]], twists[word[i], 2]
@@ -146,29 +153,31 @@ def radius(twist: Array) -> complex:
 
 
 @bare_inner_kernel
-def is_solved(known: ClosedForm, time: float) -> bool:
-    """Whether both branches of the closed form are there at a free time, but for rounding."""
-    (v_q, w_q, _, _), (a, b, c), (at_1, at_2) = known.free, known.sides, known.at
-    (d, centre, arm), (velocity, _, speed), turn = known.ways, known.straight, 1.0 + 0j
-    if known.place == 0 and w_q != 0.0:
-        turn = unit(w_q * time)
-        d = centre + arm * turn
-    elif known.place == 0:
-        d -= v_q * time
-    elif known.place == 1:
-        at_1 += v_q * time
+def margin(known: ClosedForm, time: float) -> float:
+    """How far from their ends both branches of the closed form are, below 0 where there is none."""
+    (_, w_q, _, _), (a, b, c), (at_1, at_2) = known.free, known.sides, known.at
+    (d, centre, arm), (velocity, _, speed), place = known.ways, known.straight, known.place
+    step, turn, facing = known.free[0] * time, unit(w_q * time), known.goal[1]
+    if w_q != 0.0:
+        moved = centre + arm * (turn if place < 3 else turn.conjugate())
     else:
-        at_2 += v_q * time
+        moved = (d - step, at_1 + step, at_2 + step, d - step * facing)[place]
+    d = moved if place % 3 == 0 else d
+    at_1, at_2 = moved if place == 1 else at_1, moved if place == 2 else at_2
     if a != 0.0 and b != 0.0 and c != 0.0:
         one, two = length(at_1), length(at_2)
-        return abs(one - two) <= length(d) <= one + two
+        return min(length(d) - abs(one - two), one + two - length(d))
+    if abs(a) + abs(b) + abs(c) < 2.0:
+        return math.inf  # two straights are always met
+    same = 1.0 + 0j
     if b == 0.0:
-        point, radius = at_1 + at_2, length(d)
+        point, radius = at_1 * (turn.conjugate() if place == 1 else same) + at_2, length(d)
     elif a == 0.0:
-        point, radius = d * turn.conjugate() - at_1, length(at_2)
+        point, radius = d * (turn.conjugate() if place == 0 else same) - at_1, length(at_2)
     else:
-        point, radius = d * known.goal[1].conjugate() - at_2, length(at_1)
-    return abs((point * velocity.conjugate()).imag) <= radius * speed
+        point = d * facing.conjugate() * (turn if place == 3 else same)
+        point, radius = point - at_2 * (turn.conjugate() if place == 2 else same), length(at_1)
+    return radius * speed - abs((point * velocity.conjugate()).imag)
 
 
 @bare_inner_kernel
@@ -177,11 +186,8 @@ def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, floa
     # For both branches of the closed form, as in `steer`: three turns are ``at_1 e^{i h_1} + at_2
     # e^{i h_2} = d``, the headings after the first two unknown; a straight brings its time instead.
     (v_q, w_q, speed, rate), (a, b, c), (at_1, at_2) = known.free, known.sides, known.at
-    (phase_1, phase_2, one, two), (d, centre, arm), (far, wide) = (
-        known.polar,
-        known.ways,
-        known.sizes,
-    )
+    (phase_1, phase_2, one, two), (d, centre, arm) = known.polar, known.ways
+    far, wide = known.sizes
     heading, facing = known.goal
     half = 0.5 * (high - low)
     time = low + half

@@ -108,6 +108,8 @@ class Nodes(NamedTuple):
     values: Array  # (2, N + 1) of what is to vanish, NaN where there is none
     costs: Array  # (2, N + 1)
     ends: Array  # (N,) free times at which branches end, where they do in a cell
+    grid: Array  # (N + 1,) free times of the nodes
+    margins: Array  # (N + 1,) how far from their ends both branches are, inf where they are there
     stack: Array  # (3, 24, 4) intervals: times at both ends; values there, bend, how often halved
     both: Array  # (2, 3) times of the triple
     twists: Array  # (4, 4) of the word's trims

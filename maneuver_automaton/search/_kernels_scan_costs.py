@@ -32,10 +32,9 @@ NONE_LEFT = 1e-9  # [m] that only rounding leaves
 
 @bare_inner_kernel
 def affordable(
-    problem: WordProblem, word: IntArray, n: int, trim: int, upper_bound: float
+    problem: WordProblem, word: IntArray, n: int, trim: int, reach: float, upper_bound: float
 ) -> float:
-    """How long one trim of a word may last before it alone costs more than `upper_bound`."""
-    reach = problem.trims.reaches[trim]
+    """How long, of `reach`, one trim may last before it alone costs more than `upper_bound`."""
     if problem.library.rates[trim] > 0.0:
         left = upper_bound - problem.terms.pad_cost - word_extra(problem, word, n)
         reach = min(reach, left / problem.library.rates[trim])
@@ -59,7 +58,7 @@ def any_node_may_do(
     # were left out, and plans came out 3 % costlier.
     times, out, _ = room
     q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for
-    reach = affordable(problem, word, n, word[q], upper_bound)
+    reach = affordable(problem, word, n, word[q], problem.trims.reaches[word[q]], upper_bound)
     if not reach > 0.0:
         return False
     m = problem.library.targets.size
@@ -69,12 +68,8 @@ def any_node_may_do(
     is_cheap, is_near = False, m == 0 or time_left(problem) == np.inf
     before = (math.nan, math.nan)  # what each branch lacked at the node before
     per_metre = least_per_metre(problem, word, n, q)
-    steering = (
-        problem.library.twists,
-        problem.library.goal,
-        problem.scan.tolerance,
-        candidates.counter,
-    )
+    library = problem.library
+    steering = library.twists, library.goal, problem.scan.tolerance, candidates.counter
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
         if is_near and q == 0 and least_after(problem, word[0], times[0], per_metre) >= lowest:
@@ -198,11 +193,7 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
     """Lower bound of what coasting costs in a word whose first trim lasts `time`."""
     # From where it ends, and the transition before it began, the rest of the word has to lead to
     # the goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
-    v, u, w = (
-        problem.library.twists[trim, 0],
-        problem.library.twists[trim, 1],
-        problem.library.twists[trim, 2],
-    )
+    v, u, w = problem.library.twists[trim, :3]
     dx, dy, heading = coast(v, u, w, time)
     x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
     distance = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
@@ -218,17 +209,14 @@ def is_met_nearby(
 ) -> bool:
     """Whether what a condition lacks at a node is next to nothing, or whole turns make it up."""
     # Somewhere it lacks nothing if that changes its sign since the node `before`: NaN for none.
-    target = problem.library.targets[problem.library.targets.size - 1]
+    target = problem.library.targets[-1]
     if abs(lack) <= problem.scan.slack * abs(target) or lack * before <= 0.0:
         return True
     if problem.terms.more_turns == 1:
         for s in range(3):
             i = word[triple[s]]
             if problem.trims.periods[i] < np.inf:
-                turn = (
-                    problem.trims.periods[i]
-                    * problem.library.rows[problem.library.targets.size - 1, i]
-                )
+                turn = problem.trims.periods[i] * problem.library.rows[-1, i]
                 if lack * turn > 0.0 and abs(lack) >= (1.0 - problem.scan.slack) * abs(turn):
                     return True
     return False

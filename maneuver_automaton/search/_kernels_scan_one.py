@@ -17,15 +17,17 @@ from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.search._kernels_cell_costs import (
     closed_form,
     has_bounds,
-    is_solved,
     least_costs,
+    margin,
     mark_cheap_cells,
 )
-from maneuver_automaton.search._kernels_cell_turns import TINY, ClosedForm
+from maneuver_automaton.search._kernels_cell_turns import TINY, ClosedForm, Four
 from maneuver_automaton.search._kernels_problem import (
     Candidates,
     WordProblem,
     condition,
+    is_straight,
+    time_left,
     word_extra,
 )
 from maneuver_automaton.search._kernels_scan_costs import (
@@ -47,6 +49,9 @@ from maneuver_automaton.words._kernels_times import assign
 NEARLY = 1e-4  # [m, s] a linear condition is met where branches end
 NOTHING = 1e-7  # [s] that only rounding leaves of a time: arc cosines lose half of the digits
 LEAST_NODES = 8
+QUARTER = 0.25  # of a period, by which nearest whole turns may mislead
+DOUBLED = 16  # cells beyond the usual reach, each twice as long
+GOLDEN, SECTION = 40, 0.5 * (math.sqrt(5.0) - 1.0)
 HALVED = 30  # times, of a cell in which branches end
 
 
@@ -61,11 +66,20 @@ def scan_one(
 ) -> None:
     """Words with one free time: roots of a scalar function along both branches."""
     room, q = candidates.nodes, 6 - triple[0] - triple[1] - triple[2]
-    reach = affordable(problem, word, n, word[q], upper_bound)
+    usual, grid = problem.trims.reaches[word[q]], room.grid
+    reach = affordable(problem, word, n, word[q], usual, upper_bound)
     if not reach > 0.0:
         return
-    nodes = max(LEAST_NODES, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
-    nodes = min(nodes, room.ends.size)  # not one more by rounding
+    nodes = max(LEAST_NODES, math.ceil(problem.scan.nodes * reach / usual))
+    nodes = min(nodes, room.ends.size - DOUBLED)  # not one more by rounding
+    for j in range(nodes + 1):
+        grid[j] = reach * j / nodes
+    if problem.library.targets.size > 0 and is_straight(problem, word[q]):
+        # There and back it may be as long as the time admits, of which ever less depends then.
+        latest = affordable(problem, word, n, word[q], time_left(problem), upper_bound)
+        while grid[nodes] < latest < np.inf and nodes < room.ends.size:
+            nodes += 1
+            grid[nodes] = min(2.0 * grid[nodes - 1], latest)
     # cells between nodes in which a branch may be cheap enough: the others have no solution that
     # counts, and most words have none of these
     live, four = room.live[:, :nodes], FreeTime(word, n, triple, q)
@@ -80,7 +94,11 @@ def scan_one(
             return
     for i in range(n):
         assign(room.twists[i], problem.library.twists[word[i]])
-    solve_nodes(problem, candidates, four, live, reach)
+    room.ends[:nodes] = math.nan
+    for j in range(nodes + 1):
+        solve_node(problem, candidates, four, live, j)
+    if problem.library.targets.size > 0:
+        move_nodes(problem, candidates, four, nodes, known)
     most = nearly_cheap(problem, word, n, upper_bound)
     for branch in range(2):
         for j in range(nodes):
@@ -88,48 +106,65 @@ def scan_one(
                 continue
             if not may_be_cheap(room.costs[branch, j], room.costs[branch, j + 1], most):
                 continue
-            cell = j, nodes, reach, cheap < np.inf
+            cell = j, nodes, cheap < np.inf
             if first_interval(problem, candidates, four, branch, cell, known):
                 bisect(problem, candidates, four, branch, known, cheap)
 
 
 @bare_inner_kernel
-def solve_nodes(
-    problem: WordProblem,
-    candidates: Candidates,
-    four: FreeTime,
-    live: NDArray[np.bool_],
-    reach: float,
+def solve_node(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, live: NDArray[np.bool_], j: int
 ) -> None:
-    """Fill in the nodes of live cells, and one on either side of these."""
-    room, m, nodes = candidates.nodes, problem.library.targets.size, live.shape[1]
+    """Fill in a node, if it is at an end of a live cell, or next to one that is."""
+    room, m = candidates.nodes, problem.library.targets.size
     times, values = room.work[0], room.values
-    for j in range(nodes + 1):
-        values[0, j], values[1, j] = math.nan, math.nan
-        if j < nodes:
-            room.ends[j] = math.nan
-        if not (is_wanted(live, 0, j) or is_wanted(live, 1, j)):
+    values[0, j], values[1, j] = math.nan, math.nan
+    if not (is_wanted(live, 0, j) or is_wanted(live, 1, j)):
+        return
+    times[four.q] = room.grid[j]
+    solve(problem, candidates, four, times)
+    for branch in range(2):
+        if not is_wanted(live, branch, j):
             continue
-        times[four.q] = reach * j / nodes
-        solve(problem, candidates, four, times)
-        for branch in range(2):
-            if not is_wanted(live, branch, j):
-                continue
-            room.costs[branch, j] = coasting_cost(
-                problem, four.word, four.triple, four.q, times[four.q], room.both[branch]
-            )
-            value = take_branch(problem, room, four, branch, times)
-            if math.isnan(value):
-                continue
-            assign(room.times[branch, j], times)
-            if m > 0:
-                value = condition(problem, four.word, four.n, m - 1, times)
-                if j > 0 and not math.isnan(values[branch, j - 1]):  # continuous from node to node
-                    unwrap(problem, four.word, four.triple, room.times[branch, j - 1], times)
-                    step = condition(problem, four.word, four.n, m - 1, times)
-                    step -= condition(problem, four.word, four.n, m - 1, room.times[branch, j - 1])
-                    value = values[branch, j - 1] + step
-            values[branch, j] = value
+        room.costs[branch, j] = coasting_cost(
+            problem, four.word, four.triple, four.q, times[four.q], room.both[branch]
+        )
+        value = take_branch(problem, room, four, branch, times)
+        if math.isnan(value):
+            continue
+        assign(room.times[branch, j], times)
+        if m > 0:
+            value = condition(problem, four.word, four.n, m - 1, times)
+            if j > 0 and not math.isnan(values[branch, j - 1]):  # continuous from node to node
+                unwrap(problem, four.word, four.triple, room.times[branch, j - 1], times)
+                step = condition(problem, four.word, four.n, m - 1, times)
+                step -= condition(problem, four.word, four.n, m - 1, room.times[branch, j - 1])
+                value = values[branch, j - 1] + step
+        values[branch, j] = value
+
+
+@bare_inner_kernel
+def move_nodes(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, nodes: int, known: ClosedForm
+) -> None:
+    """Move nodes without solutions to where there are some between their neighbours."""
+    # Branches may be there for a moment only: where circles touch, as after turns by exactly pi.
+    room, grid, margins = candidates.nodes, candidates.nodes.grid, candidates.nodes.margins
+    for j in range(nodes + 1):
+        margins[j] = margin(known, grid[j]) if math.isnan(room.values[0, j]) else math.inf
+    for j in range(nodes + 1):
+        low, high = max(j - 1, 0), min(j + 1, nodes)
+        least, greatest = min(margins[low], margins[high]), max(margins[low], margins[high])
+        if 0.0 > margins[j] >= greatest and 2.0 * margins[j] >= least:
+            left, right = grid[low], grid[high]
+            for _ in range(GOLDEN):
+                width = SECTION * (right - left)
+                if margin(known, right - width) < margin(known, left + width):
+                    left = right - width
+                else:
+                    right = left + width
+            grid[j] = 0.5 * (left + right)
+            solve_node(problem, candidates, four, room.live[:, :nodes], j)
 
 
 @bare_inner_kernel
@@ -158,17 +193,12 @@ def first_interval(
     candidates: Candidates,
     four: FreeTime,
     branch: int,
-    cell: tuple[int, int, float, bool],
+    cell: tuple[int, int, bool],
     known: ClosedForm,
 ) -> bool:
     """Put a cell of a branch onto the stack; False where there is nothing to look for."""
-    room, (j, nodes, reach, pruned) = candidates.nodes, cell
-    values, low, high, numbers = (
-        room.values[branch],
-        room.stack[0, 0],
-        room.stack[1, 0],
-        room.stack[2, 0],
-    )
+    room, (j, nodes, pruned) = candidates.nodes, cell
+    grid, values, (low, high, numbers) = room.grid, room.values[branch], room.stack[:, 0]
     at_low, at_high = not math.isnan(values[j]), not math.isnan(values[j + 1])
     if not (at_low or at_high):
         return False
@@ -177,23 +207,15 @@ def first_interval(
         bend = max(bend_at(values, j), bend_at(values, j + 1))
     assign(low, room.times[branch, j])
     assign(high, room.times[branch, j + 1])
-    low[four.q], high[four.q] = reach * j / nodes, reach * (j + 1) / nodes
+    low[four.q], high[four.q] = grid[j], grid[j + 1]
     numbers[0], numbers[1], numbers[2], numbers[3] = values[j], values[j + 1], bend, 0.0
     here, beyond = (j, j + 1) if at_low else (j + 1, j)
     if not (at_low and at_high):  # both branches end in between, where they meet
         if math.isnan(room.ends[j]):
-            between = reach * here / nodes, reach * beyond / nodes
-            room.ends[j] = end_of_branches(problem, candidates, four, between, branch, known)
+            room.ends[j] = end_of_branches(known, grid[here], grid[beyond])
         edge = high if beyond > here else low
-        edge[:] = 0.0
         edge[four.q] = room.ends[j]
-        numbers[beyond - j] = evaluate(problem, candidates, four, edge, branch)
-        if problem.library.targets.size > 0:  # they may meet in a solution: then no sign changes
-            span = room.span[: problem.library.targets.size]
-            for r in range(len(span)):
-                span[r, 0] = condition(problem, four.word, four.n, r, edge) - NEARLY
-                span[r, 1] = span[r, 0] + 2.0 * NEARLY
-            levels(problem, candidates, four.word, four.n, edge, edge, edge, span)
+        numbers[beyond - j] = take_edge(problem, candidates, four, branch, edge)
     if pruned:
         # A trim that lasts no time at both ends and halfway lasts none in between, as the branch is
         # analytic: what there is to find is a shorter word, and the gradient nothing but rounding.
@@ -206,6 +228,35 @@ def first_interval(
 
 
 @bare_inner_kernel
+def take_edge(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, branch: int, edge: Array
+) -> float:
+    """Fill `edge` with the times where a branch ends, and propose them; what is to vanish there."""
+    value = evaluate(problem, candidates, four, edge, branch)
+    if problem.library.targets.size > 0:  # branches may meet in a solution: then no sign changes
+        assign(candidates.nodes.work[1], edge)
+        assign(candidates.nodes.work[2], edge)
+        propose_near(problem, candidates, four, edge, NEARLY)
+    return value
+
+
+@bare_inner_kernel
+def propose_near(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, start: Array, around: float
+) -> None:
+    """Propose times of an interval where the last condition is met but for `around`."""
+    room, library = candidates.nodes, problem.library
+    _, least, greatest = room.work
+    m = library.targets.size
+    for r in range(m):
+        value, wide = condition(problem, four.word, four.n, r, start), around
+        for i in range(four.n if r < m - 1 else 0):
+            wide += abs(library.rows[r, four.word[i]]) * (greatest[i] - least[i])
+        room.span[r, 0], room.span[r, 1] = value - wide, value + wide
+    levels(problem, candidates, four.word, four.n, start, least, greatest, room.span[:m])
+
+
+@bare_inner_kernel
 def bend_at(values: Array, k: int) -> float:
     """By how much a function bends at a node; inf where it is not known."""
     second = values[k - 1] - 2.0 * values[k] + values[k + 1]
@@ -213,36 +264,14 @@ def bend_at(values: Array, k: int) -> float:
 
 
 @bare_inner_kernel
-def end_of_branches(
-    problem: WordProblem,
-    candidates: Candidates,
-    four: FreeTime,
-    between: tuple[float, float],
-    branch: int,
-    known: ClosedForm,
-) -> float:
+def end_of_branches(known: ClosedForm, good: float, beyond: float) -> float:
     """How far both branches go from a free time with solutions towards one without."""
-    good, beyond = between
-    times = candidates.nodes.work[0]
-    # Where they end in the plane takes no angle. The times on either side of that are looked at.
-    for _ in range(HALVED):
+    for _ in range(HALVED):  # where they end in the plane takes no angle
         middle = 0.5 * (good + beyond)
-        if is_solved(known, middle):
+        if margin(known, middle) >= 0.0:
             good = middle
         else:
             beyond = middle
-    times[four.q] = good
-    if good == between[0] or not math.isnan(evaluate(problem, candidates, four, times, branch)):
-        times[four.q] = beyond
-        if beyond == between[1] or math.isnan(evaluate(problem, candidates, four, times, branch)):
-            return good
-    good, beyond = between
-    for _ in range(HALVED):
-        times[four.q] = 0.5 * (good + beyond)
-        if math.isnan(evaluate(problem, candidates, four, times, branch)):
-            beyond = times[four.q]
-        else:
-            good = times[four.q]
     return good
 
 
@@ -257,17 +286,11 @@ def bisect(
 ) -> None:
     """Halve the interval on the stack if below `cheap` and bent enough for roots; propose these."""
     room, word, n, triple, q = candidates.nodes, four.word, four.n, four.triple, four.q
-    lows, highs, numbers = room.stack[0], room.stack[1], room.stack[2]
-    middle, least, greatest = room.work[0], room.work[1], room.work[2]
+    (lows, highs, numbers), (middle, least, greatest) = room.stack, room.work
     top, m = 0, problem.library.targets.size
-    span = room.span[:m]
-    for r in range(m - 1):  # all but the last are met by whoever refines what is proposed
-        span[r, 0], span[r, 1] = -np.inf, np.inf
     while top >= 0:
         low, high = lows[top], highs[top]
-        value_low, value_high, bend, depth = (
-            numbers[top, 0], numbers[top, 1], numbers[top, 2], numbers[top, 3],
-        )  # fmt: skip
+        value_low, value_high, bend, depth = numbers[top]
         top -= 1
         if depth > 0.0 and cheap < np.inf and least_costs(known, low[q], high[q])[branch] > cheap:
             continue
@@ -281,43 +304,52 @@ def bisect(
             settled = bend <= 0.5 * change
             if possible and settled and value_low < 0.0 <= value_high:
                 ends_of_root = (low[q], value_low, high[q], value_high)
-                secant(problem, candidates, four, branch, ends_of_root, middle, span)
+                secant(problem, candidates, four, branch, ends_of_root)
         else:
             unwrap(problem, word, triple, low, high)
+            for i in triple:  # a turn may as well go the other way round: next to a centre
+                if abs(high[i] - low[i]) > QUARTER * problem.trims.periods[word[i]]:
+                    bend = np.inf
+            for i in range(n):
+                middle[i] = 0.5 * (low[i] + high[i])
+                least[i], greatest[i] = min(low[i], high[i]), max(low[i], high[i])
             at_low = condition(problem, word, n, m - 1, low)
             at_high = condition(problem, word, n, m - 1, high)
             change = abs(at_high - at_low)
-            wide = bend if bend < np.inf else 1e300
-            span[m - 1, 0] = min(at_low, at_high) - wide
-            span[m - 1, 1] = max(at_low, at_high) + wide
-            for i in range(n):
-                middle[i] = 0.5 * (low[i] + high[i])
             settled = bend <= 0.5 * change
             before = candidates.counter[0]
-            for i in range(n):
-                least[i], greatest[i] = min(low[i], high[i]), max(low[i], high[i])
-            levels(problem, candidates, word, n, middle, least, greatest, span)
+            propose_near(problem, candidates, four, middle, 0.5 * change + bend)
             possible = candidates.counter[0] > before
             if bend > 0.0:  # that was with room for the bend: only what is left counts
                 candidates.counter[0] = before
-                if possible and (settled or depth >= 8.0):
-                    span[m - 1, 0], span[m - 1, 1] = min(at_low, at_high), max(at_low, at_high)
-                    levels(problem, candidates, word, n, middle, least, greatest, span)
+                if possible and settled:
+                    propose_near(problem, candidates, four, middle, 0.5 * change)
+                    propose_near(problem, candidates, four, low, NEARLY)
+                    propose_near(problem, candidates, four, high, NEARLY)
+                elif possible and depth >= 8.0:
+                    propose_all_along(problem, candidates, four, top + 1, bend)
         if not possible or depth >= 8.0 or (settled and bend <= 0.25 * change):
             continue
         middle[q] = 0.5 * (low[q] + high[q])
         value = evaluate(problem, candidates, four, middle, branch)
-        if math.isnan(value):
+        if math.isnan(value) and m == 0:
             continue
-        if m == 0:
+        # upper half first onto the stack: it overwrites the interval that was taken off
+        assign(highs[top + 2], high)
+        if math.isnan(value):  # branches end in between, and come back
+            hole, off = middle[q], np.inf
+            lows[top + 2, q] = end_of_branches(known, high[q], hole)
+            take_edge(problem, candidates, four, branch, lows[top + 2])
+            highs[top + 1, q] = end_of_branches(known, low[q], hole)
+            take_edge(problem, candidates, four, branch, highs[top + 1])
+        elif m == 0:
             off = abs(value - 0.5 * (value_low + value_high))
         else:
             unwrap(problem, word, triple, low, middle)
             off = abs(condition(problem, word, n, m - 1, middle) - 0.5 * (at_low + at_high))
-        # upper half first onto the stack: it overwrites the interval that was taken off
-        assign(lows[top + 2], middle)
-        assign(highs[top + 2], high)
-        assign(highs[top + 1], middle)
+        if not math.isnan(value):
+            assign(lows[top + 2], middle)
+            assign(highs[top + 1], middle)
         numbers[top + 2, 0], numbers[top + 2, 1] = value, value_high
         numbers[top + 1, 0], numbers[top + 1, 1] = value_low, value
         for k in range(1, 3):
@@ -326,17 +358,41 @@ def bisect(
 
 
 @bare_inner_kernel
+def propose_all_along(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, at: int, bend: float
+) -> None:
+    """Propose times of a short interval: at a root it may turn back, or jump from side to side."""
+    room, (middle, least, greatest) = candidates.nodes, candidates.nodes.work
+    low, high, around = (
+        room.stack[0, at],
+        room.stack[1, at],
+        NEARLY + (bend if bend < np.inf else 0.0),
+    )
+    last = problem.library.targets.size - 1
+    for way in range(8):  # every turn that jumps may do so either way
+        i = four.triple[0 if way % 2 else 1 if way % 4 else 2]
+        period = problem.trims.periods[four.word[i]]
+        if way > 0:
+            if not abs(high[i] - low[i]) > QUARTER * period:
+                continue
+            high[i] -= math.copysign(period, high[i] - low[i])
+        for i in range(four.n):
+            least[i], greatest[i], middle[i] = min(low[i], high[i]), max(low[i], high[i]), low[i]
+        change = condition(problem, four.word, four.n, last, high)
+        change -= condition(problem, four.word, four.n, last, low)
+        for _ in range(5):
+            propose_near(problem, candidates, four, middle, around + QUARTER * abs(change))
+            for i in range(four.n):
+                middle[i] += QUARTER * (high[i] - low[i])
+
+
+@bare_inner_kernel
 def secant(
-    problem: WordProblem,
-    candidates: Candidates,
-    four: FreeTime,
-    branch: int,
-    ends: tuple[float, float, float, float],
-    middle: Array,
-    span: Array,
+    problem: WordProblem, candidates: Candidates, four: FreeTime, branch: int, ends: Four
 ) -> None:
     """Narrow down where the reduced gradient rises through zero, and propose it."""
-    q = four.q
+    room, q = candidates.nodes, four.q
+    middle = room.work[0]
     left, value_low, right, value_high = ends
     for step in range(12):
         share = 0.5
@@ -352,4 +408,4 @@ def secant(
             right, value_high = middle[q], value
         if right - left < 1e-3:
             break
-    levels(problem, candidates, four.word, four.n, middle, middle, middle, span)
+    levels(problem, candidates, four.word, four.n, middle, middle, middle, room.span[:0])

@@ -216,12 +216,10 @@ def levels(
         period = problem.trims.periods[word[i]]
         if period < np.inf:
             first[i] = -math.floor(high[i] / period)
-            last[i] = 1 if low[i] <= 1e-9 else 0
+            last[i] = 1 if low[i] <= max(1e-9, high[i] - low[i]) else 0  # it may get to none
             if problem.terms.more_turns == 1 and m > 0:
-                most = (
-                    2 if time_left(problem) == np.inf else math.floor(time_left(problem) / period)
-                )
-                last[i] += int(most)
+                most = min(time_left(problem) / period, 1e6)
+                last[i] += 2 if time_left(problem) == np.inf else math.floor(most)
             last[i] = max(last[i], first[i])
         shifts[i] = first[i]
     while True:
@@ -236,11 +234,8 @@ def levels(
             shift = 0.0
             for i in range(n):
                 if shifts[i] != 0:
-                    shift += (
-                        shifts[i]
-                        * problem.trims.periods[word[i]]
-                        * problem.library.rows[r, word[i]]
-                    )
+                    turned = shifts[i] * problem.trims.periods[word[i]]
+                    shift += turned * problem.library.rows[r, word[i]]
             if not span[r, 0] <= problem.library.targets[r] - shift <= span[r, 1]:
                 inside = False
         if inside:

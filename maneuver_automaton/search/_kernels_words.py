@@ -60,12 +60,8 @@ def closed_form_words(
 ) -> None:
     """Words of three trims: isolated solutions."""
     times, out, span = room
-    steering = (
-        problem.library.twists,
-        problem.library.goal,
-        problem.scan.tolerance,
-        candidates.counter,
-    )
+    library = problem.library
+    steering = library.twists, library.goal, problem.scan.tolerance, candidates.counter
     solve_triple(steering, word, n, triple, times, out)
     for branch in range(2):
         admissible = not math.isnan(out[branch, 0])
@@ -442,10 +438,8 @@ def scan_mode(
     not_first: int,
 ) -> None:
     """Scan words of `n` trims, with a free turn if `tail`, not from `not_first`; polish them."""
-    last = (problem.library.twists.shape[0] - tail) ** n
-    each = (problem.library.twists.shape[0] - tail) ** (
-        n - 1
-    )  # words that begin with the same trim
+    trims = problem.library.twists.shape[0] - tail
+    each, last = trims ** (n - 1), trims**n  # words that begin with one trim, and all
     left_out = not_first * each if not_first >= 0 else last
     n += tail
     for scan in range(2):  # words that cannot span the plane; those that can

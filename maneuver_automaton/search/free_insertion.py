@@ -138,7 +138,7 @@ def _improved(work: _Insertion) -> SearchResult:
         work = replace(work, seeds=_usual_seeds(work.task, work.setup))
     seeds = _words_of_few(work, work.problem)
     if not seeds and work.total is not None and not work.task.budget.is_over:
-        seeds = _fast_words(work)
+        seeds = _fast_words(work, work.total)
     return _improved_from(work, [*known, *seeds])
 
 
@@ -313,9 +313,11 @@ def _words_of_few(work: _Insertion, problem: Problem) -> list[TimedWord]:
     return [_in_library(work, solution.trims, solution.durations) for solution in solutions]
 
 
-def _fast_words(work: _Insertion) -> list[TimedWord]:
-    """For a time that no seed meets: first insert for least time, then fill up the time."""
-    limit = work.total
+def _fast_words(work: _Insertion, limit: float) -> list[TimedWord]:
+    """For a time that no seed meets: first insert for least time, then fill up the time.
+
+    Where no trim stands still, detours fill it up: what is inserted leaves the least unused.
+    """
     hurry = replace(work.problem, cost=Cost(time=1.0), horizon=Horizon())
     setup = search_setup(hurry, hurry.goals[0])
     setup = replace(setup, goal=work.setup.goal, free_heading=work.setup.free_heading)
@@ -323,17 +325,29 @@ def _fast_words(work: _Insertion) -> list[TimedWord]:
     least = replace(
         work, problem=hurry, setup=setup, library=library, exact=library.problem.goal, limit=None
     )
+    filled, earliest = None, -math.inf
+    if work.library.rest is None:
+        library, earliest = library.within_time(limit), limit - LATE
+        idle = np.eye(len(library.problem.rates))[library.n_priced - 1]
+        library = replace(library, problem=library.problem._replace(rates=idle))
+        filled = replace(least, library=library, limit=limit)
     met = []
     for seed in _words_of_few(least, hurry):
         if work.task.budget.is_over:
             break
-        word = _with_insertions(library, seed, LONGEST, _fitting(least, ROUNDS), {"insertions": 0})
-        if not math.isfinite(word.cost):
-            continue
-        quick = next(_solutions(least, word), None)
-        if quick is not None and limit is not None and quick.duration <= limit + LATE:
+        quick = _grown(least, seed)
+        if quick is not None and filled is not None and quick.duration <= limit + LATE:
+            quick = _grown(filled, _in_library(filled, quick.trims, quick.durations))
+        if quick is not None and earliest <= quick.duration <= limit + LATE:
             met.append(_in_library(work, quick.trims, quick.durations))
     return met
+
+
+def _grown(work: _Insertion, seed: TimedWord) -> Word | None:
+    """The solution that insertion makes of a seed, if there is one."""
+    rounds = _fitting(work, ROUNDS)
+    word = _with_insertions(work.library, seed, LONGEST, rounds, {"insertions": 0})
+    return next(_solutions(work, word), None) if math.isfinite(word.cost) else None
 
 
 def _in_library(work: _Insertion, trims: IntArray, durations: Array) -> TimedWord:

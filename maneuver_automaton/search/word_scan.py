@@ -34,7 +34,7 @@ from maneuver_automaton.search._kernels_problem import (
     WordProblem,
     WordTerms,
 )
-from maneuver_automaton.search._kernels_scan_one import LEAST_NODES
+from maneuver_automaton.search._kernels_scan_one import DOUBLED, LEAST_NODES
 from maneuver_automaton.search.momenta import NONE, momenta_of
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import Columns, SearchSetup, columns
@@ -44,6 +44,7 @@ from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 4  # trims of one word, the free turn among them: three in closed form, one scanned
 NODES = 64  # per scanned time, bisected where the function bends
+BLEND = 0.618034  # [s/m]
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
 SECONDS_IF_FREE = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by trims, for words of no linear condition
@@ -120,7 +121,8 @@ class WordScan:
         self.reaches[self.tables.straights] = np.minimum(straight, self.limit)
         if setup.climbs:
             for mode in self.modes:
-                mode.kernel_problem[0].library.targets[0] = rise
+                targets = mode.kernel_problem[0].library.targets
+                targets[0], targets[1:] = rise, self.limit + BLEND * rise
         if len(self.found.costs) > CAPACITY:
             self._make_room(CAPACITY)
         self.counters[:] = 0, 0, 0, 0, left_out
@@ -264,7 +266,11 @@ class WordScan:
         known, kept, rest_rate = setup.transitions, tables.columns, setup.library.rest_rate * pad
         height, rise = known.displacement[..., 3], float(setup.goal[3])
         met = [(kept.twists[:, 3], height, rise)] if setup.climbs else []
-        met += [(kept.weights, known.time, limit)] if fixed else []
+        if fixed:  # with a share of the altitude: trims alike but for that take the same time
+            b = BLEND if setup.climbs else 0.0
+            met += [
+                (kept.weights + b * kept.twists[:, 3], known.time + b * height, limit + b * rise)
+            ]
         links = Links(
             class_of=known.class_of[kept.trims],
             start=setup.start_class,
@@ -352,8 +358,8 @@ class WordScan:
 
 def _room(most: int) -> Nodes:
     """Room for the nodes of a word's free time."""
-    n = max(most, LEAST_NODES)
-    nodes = (2, n + 1, 4), (2, n + 1), (2, n + 1), (n,)
+    n = max(most, LEAST_NODES) + DOUBLED
+    nodes = (2, n + 1, 4), (2, n + 1), (2, n + 1), (n,), (n + 1,), (n + 1,)
     others = (3, 24, 4), (2, 3), (4, 4), (4, 3), (3, 4), (2, 2)
     live, stretches = np.empty((2, n), dtype=np.bool_), np.empty((40, 2), dtype=np.int64)
     return Nodes(live, stretches, *[np.empty(shape) for shape in (*nodes, *others)])

@@ -363,8 +363,10 @@ def test_the_end_is_exact_however_near_the_goal(size):
 
 
 @compiled_only
-def test_a_climb_to_any_heading_begins_with_three_trims():
-    """Place, altitude and heading are four conditions: three trims, and the turn that is free."""
+@pytest.mark.parametrize("time", [None, 9.0])
+@pytest.mark.parametrize("free", [True, False])
+def test_a_climb_begins_with_as_many_trims_as_it_has_conditions(free, time):
+    """Place, altitude and heading are four; without rest, detours fill up a time that is fixed."""
     craft = {
         "ahead": (1, 0, 0, 0),
         "left": (1, 0, 1, 0),
@@ -374,7 +376,9 @@ def test_a_climb_to_any_heading_begins_with_three_trims():
     model = UserModel(
         name="craft", group=SE2xR, control_names=tuple("abcd"), velocity=lambda _, u: np.asarray(u)
     )
-    goal = Goal(pose=[3.0, 2.0, 1.0, 2.0], free_heading=True)
-    problem = Problem(Automaton.of_controls(model, craft), [0, 0, 0, 0], goal)
-    solution = best(problem)
-    assert plan_of(problem, solution).end[[0, 1, 3]] == pytest.approx([3.0, 2.0, 2.0], abs=1e-9)
+    goal = Goal(pose=[3.0, 2.0, 1.0, 2.0], free_heading=free)
+    horizon = Horizon(time=time)
+    problem = Problem(Automaton.of_controls(model, craft), [0, 0, 0, 0], goal, horizon=horizon)
+    plan = plan_of(problem, best(problem))
+    assert plan.end[[0, 1, 3]] == pytest.approx([3.0, 2.0, 2.0], abs=1e-9)
+    assert plan.duration == pytest.approx(time or plan.duration, abs=1e-9)

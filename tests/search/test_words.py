@@ -431,11 +431,17 @@ def test_start_equal_to_goal():
         ("left spin right", (2.0, math.pi, 1.0)),  # along one circle
         ("right spin right", (1.5 * math.pi, math.pi, 2.0)),  # where two circles touch
         ("side spin left spin", (0.2, 0.1, math.pi, 0.5)),
+        ("spin right left right", (1.0, math.pi, math.pi, math.pi)),  # from one heading alone
+        ("spin slow spin slow", (2.0, 4.0, 3.0, 3.9)),  # there and back, far beyond the goal
+        ("on spin diag spin", (2.0, math.pi, 2.0, 0.5)),  # the least time there is
+        ("on orbit spin left", (0.5, 2.0 * math.pi, 1.5 * math.pi, math.pi)),  # about one centre
+        ("on orbit on left", (2.0, 12.56, 1.0, math.pi)),  # next to where there is none
     ],
 )
 def test_words_that_turn_back_take_a_given_time(names, times):
     controls = {"on": (1, 0, 0), "slow": (0.5, 0, 0), "side": (0, 1, 0), "spin": (0, 0, 1)}
-    controls |= {"left": (1, 0, 1), "right": (1, 0, -1)}
+    controls |= {"left": (1, 0, 1), "right": (1, 0, -1), "diag": (-0.5, -0.5, 0)}
+    controls |= {"orbit": (0, 0.5, -0.5)}
     robot = Automaton.of_controls(Omnidirectional(), {n: controls[n] for n in names.split()})
     known = Plan(np.zeros(3), [robot[n] for n in names.split()], durations=times)
     horizon = Horizon(time=known.duration, max_trims=len(times))
