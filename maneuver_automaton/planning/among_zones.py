@@ -62,10 +62,6 @@ class AmongZones(PlanningStep):
 
     search: Answer
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each question has a moment."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the answers that keep to all zones, quickened outside of them."""
         problem, budget, alternatives = found.problem, found.budget, found.alternatives
