@@ -26,8 +26,6 @@ from maneuver_automaton.automaton.cutting import (
 )
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -355,37 +353,26 @@ def why_not_free(vehicle: FleetMember, course: FleetCourse, keep: float = math.i
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
         until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
         enough = max(keep - CONTACT, CONTACT)
-        if levels is None and _is_free(problem, shapes, motion, until, keep, frame):
-            continue
+        if levels is None:
+            world = world_of(problem.obstacles, shapes, frame, keep=keep)
+            lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
+            free = free_times(
+                world,
+                world.into(motion.pose),
+                twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
+                durations=lasting,
+                margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
+                keep=keep,
+                times=motion.time,
+            )
+            if (free >= lasting).all():
+                continue
         least = nearest_obstacle(
             shapes, motion, problem.obstacles, until=until, levels=levels, enough=enough
         )
         if least.distance <= enough:
             return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
     return ""
-
-
-def _is_free(
-    problem: Problem,
-    shapes: tuple[Shape, ...],
-    motion: Motion,
-    until: float,
-    keep: float,
-    frame: tuple[float, ...],
-) -> bool:
-    """Whether the kernels prove that a body keeps a distance [m] until a time [s]."""
-    world = world_of(problem.obstacles, shapes, frame, keep=keep)
-    lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
-    free = free_times(
-        world,
-        world.into(motion.pose),
-        twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
-        durations=lasting,
-        margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
-        keep=keep,
-        times=motion.time,
-    )
-    return bool((free >= lasting).all())
 
 
 def distance_to_obstacles(vehicle: FleetMember, course: FleetCourse) -> float:
