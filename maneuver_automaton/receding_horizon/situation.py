@@ -46,7 +46,7 @@ from maneuver_automaton.receding_horizon.rest_of_plan import (
     rested,
     same_word,
 )
-from maneuver_automaton.receding_horizon.settings import EXACT, Settings, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.search.result import TIE
 
 FINISHED = 2  # candidates of a step for which controls between those of the library are sought
@@ -192,7 +192,7 @@ class Situation:
     def may_rest(self) -> bool:
         """Whether the vehicle may end its drive here: it switches at will, or its plan is over."""
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return (switches_at_will(self.here) and not fixed) or self.is_over
+        return (not self.here.has_inertia and not fixed) or self.is_over
 
     def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""
@@ -231,7 +231,7 @@ class Situation:
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
-        if pad is not None and not switches_at_will(here):
+        if pad is not None and here.has_inertia:
             pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)

@@ -28,7 +28,7 @@ from maneuver_automaton.receding_horizon.failsafe import (
 )
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, first_part
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
-from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.receding_horizon.situation import Situation
 
 LEAST_AHEAD = 1e-9  # [s] that a fail-safe trajectory covers at least
@@ -222,7 +222,7 @@ class StepSearch:
                 return one
             safe.append(one)
         near = within(rest.end, now.here.goals[last.goal_index])
-        if near and not (safe and switches_at_will(now.here)) and self.is_safe(rest):
+        if near and not (safe and not now.here.has_inertia) and self.is_safe(rest):
             return now.candidate(rest, last.goal_index, Origin.SHIFTED)
         return min(safe, key=lambda one: one.cost, default=None)
 
