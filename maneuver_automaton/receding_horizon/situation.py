@@ -274,18 +274,14 @@ class Situation:
                     yield again, Origin.REANCHORED
             yield self.rest, Origin.SHIFTED
             return
-        known, then = self._until_next(self.planned())
+        known, then = self.until_next()
         aim = goal if then is None else Goal(then.start, trim=then.trims[0].name)
         for plan in reanchored(here, known, aim, pad=pad, under_way=under_way):
             yield plan if then is None else followed_by(plan, then), Origin.REANCHORED
 
-    @property
-    def after_next(self) -> Plan | None:
-        """The last plan after the next pose on the way; None if it leads past none."""
-        return self._until_next(self.planned())[1]
-
-    def _until_next(self, plan: Plan) -> tuple[Plan, Plan | None]:
-        """A plan to the next pose on the way that it passes, and its rest; None if it is whole."""
+    def until_next(self) -> tuple[Plan, Plan | None]:
+        """The last plan to the next pose on the way, and its rest; None if it leads past none."""
+        plan = self.planned()
         ahead = [one.time - plan.start_time for one in passed_on_the_way(self.here, plan)]
         if not ahead or committed(plan, ahead[0]) > NOTHING:
             return plan, None

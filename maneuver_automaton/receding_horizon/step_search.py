@@ -123,7 +123,7 @@ class StepSearch:
         followed = kept is not None and not (self.now.off_plan or self.now.changed)
         if followed and not self.here.moves:
             return []
-        then = self.now.after_next
+        _, then = self.now.until_next()
         found = None
         if kept is None and then is not None:
             found = self.planned_anew(0.5, improve=False, then=then)
