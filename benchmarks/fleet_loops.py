@@ -49,7 +49,6 @@ from maneuver_automaton.fleet import (
 from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon import Disturbance
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 from tests.fleet.mortal import Mortal
 from tests.fleet.robots import at_rest
 
@@ -77,7 +76,7 @@ def settings_of(case: str, fleet: FleetProblem, seed: int) -> dict[str, Any]:
     broken = {str(rng.choice(fleet.names)): float(rng.uniform(1.0, 8.0))}
     dies = {k: float(rng.uniform(0.0, 8.0)) for k in range(len(fleet)) if rng.random() < DIES}
     rows = zip(fleet.names, fleet.problems, strict=True)
-    noise = {name: NOISE if switches_at_will(problem) else LITTLE for name, problem in rows}
+    noise = {name: LITTLE if problem.has_inertia else NOISE for name, problem in rows}
     upset: dict[str, Any] = {"disturbance": noise}
     lost = upset | {"lost": losing(seed)}
     return {

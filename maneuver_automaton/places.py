@@ -500,13 +500,7 @@ class Raster:
 
     def moved(self, by: LieGroup) -> Raster:
         """The raster moved by a planar pose."""
-        return Raster(
-            self.values,
-            resolution=self.resolution,
-            origin=(planar(by) @ SE2(self.origin)).pose,
-            are_heights=self.are_heights,
-            max_cross_slope=self.max_cross_slope,
-        )
+        return replace(self, origin=(planar(by) @ SE2(self.origin)).pose)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

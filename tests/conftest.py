@@ -64,3 +64,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for number, item in enumerate(rows):
             if number % SOME:
                 item.add_marker("exhaustive")
+
+
+@pytest.fixture
+def folder(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with the files of `FILES`, by name, if the tests of a module have any."""
+    monkeypatch.chdir(tmp_path)
+    for name, content in getattr(request.module, "FILES", {}).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        raw = content if isinstance(content, bytes) else content.encode()
+        (tmp_path / name).write_bytes(raw)
+    return tmp_path

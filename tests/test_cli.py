@@ -37,14 +37,7 @@ obstacles:
   - {box_m: {center: [1.0, 0.2], size: [0.2, 0.5]}}
 """
 AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with a scenario in it."""
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(SCENARIO)
-    return tmp_path
+FILES = {"x.yaml": SCENARIO}
 
 
 def result_file(out: str = "out") -> dict[str, object]:

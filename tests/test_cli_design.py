@@ -18,12 +18,7 @@ vehicle: {model: unicycle}
 trims: {speed: [-1, 0, 1], turn_rate: [-1, -0.5, 0, 0.5, 1]}
 design: {cost: {time: 1}, within: 1.05}
 """
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 def design(text, *options, name="d.yaml"):

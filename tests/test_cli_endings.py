@@ -40,16 +40,8 @@ LONG = SCENARIO.replace("x_trims: 4}", "").replace(  # never done before its tim
 LATE = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
 AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
 STREAMS = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with a scenario, one without a plan, and one that is bad."""
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(SCENARIO)
-    Path("none.yaml").write_text(AHEAD_ONLY)
-    Path("bad.yaml").write_text("schema: 2")
-    return tmp_path
+FILES = {"x.yaml": SCENARIO, "none.yaml": AHEAD_ONLY, "bad.yaml": "schema: 2"}
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 @pytest.fixture(autouse=True)

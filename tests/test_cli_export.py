@@ -163,8 +163,7 @@ def test_a_drive_that_missed_its_goal_is_told(road, tmp_path, capsys):
          "got no drive on a CommonRoad scenario, need a plan or drive of its XML file"),
     ],
 )  # fmt: skip
-def test_wrong_options_are_told_in_one_line(plan, options, said, capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_wrong_options_are_told_in_one_line(plan, options, said, capsys, folder):
     assert run(["export", str(plan), *options]) == 2
     err = capsys.readouterr().err
     assert said in err

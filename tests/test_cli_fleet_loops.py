@@ -27,14 +27,7 @@ LOOP = (
     .replace("time_limit_s: 1}", "time_limit_s: 60}")
     + "receding_horizon: {step_s: 0.5, disturbance: {position_m: 0.003, seed: 3}}\n"
 )
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with a fleet in it."""
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(LOOP)
-    return tmp_path
+FILES = {"x.yaml": LOOP}
 
 
 @pytest.fixture(scope="module")

@@ -50,14 +50,7 @@ KEYS = [
     "alone_cost", "sum_s", "last_s", "lower_bound", "gap", "clearance_m", "closest", "order",
     "improvements", "timing_s", "counts", "vehicles",
 ]  # fmt: skip
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with a fleet in it."""
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(FLEET)
-    return tmp_path
+FILES = {"x.yaml": FLEET}
 
 
 def document(out="out"):

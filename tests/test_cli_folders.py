@@ -14,16 +14,7 @@ from tests.scenario.files import SCENARIO, but
 LOOP = SCENARIO + "receding_horizon: {step_s: 1.0, steps: 12}\n"
 AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
 QUICK = ("--no-plot", "--time-limit", "5")
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder; one within it holds three problems."""
-    monkeypatch.chdir(tmp_path)
-    Path("many").mkdir()
-    for name, text in (("a", LOOP), ("b", AHEAD_ONLY), ("c", LOOP)):
-        Path(f"many/{name}.yaml").write_text(text)
-    return tmp_path
+FILES = {"many/a.yaml": LOOP, "many/b.yaml": AHEAD_ONLY, "many/c.yaml": LOOP}
 
 
 def killed_after(count, monkeypatch):

@@ -23,33 +23,30 @@ NAV2 = (
 )
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with `many`, a folder that holds files of all kinds."""
-    monkeypatch.chdir(tmp_path)
-    many = Path("many")
-    many.mkdir()
-    (many / "a.yaml").write_text(SCENARIO)
-    (many / "b.yaml").write_text(SCENARIO + "obstacles: [{map: used.yaml}]\n")
-    for name in ("used", "nav"):
-        (many / f"{name}.pgm").write_bytes(b"P5 4 2 255\n" + bytes([254] * 7 + [0]))
-        (many / f"{name}.yaml").write_text(NAV2.replace("nav.pgm", f"{name}.pgm"))
-    (many / "Case0.csv").write_text(test_tpcap.CASE)
-    (many / "results.csv").write_text("planner,case\nours,1\n")
-    (many / "yard.yaml").write_text(test_dynobench.PROBLEM)
-    (many / "unicycle1_v0.yaml").write_text(test_dynobench.MODEL)
-    (many / "solution.yaml").write_text("states: [[0, 0, 0]]\nactions: []\n")
-    (many / "flat.cfg").write_text(test_sbpl_cfg.NAV2D)
-    (many / "setup.cfg").write_text("[metadata]\nname = x\n")
-    (many / "room.map").write_text(test_movingai.MAP)
-    (many / "room.map.scen").write_text(test_movingai.SCEN)
-    (many / "hall.map").write_text(test_movingai.MAP)
-    (many / "picture.svg").write_text("<svg/>")
-    (many / "prims.mprim").write_text("resolution_m: 0.1\n")
-    (many / "notes.txt").write_text("nothing to plan")
-    (many / ".hidden.yaml").write_text("nonsense")
-    Path("beside.yaml").write_text(BESIDE)
-    return tmp_path
+PIXELS = b"P5 4 2 255\n" + bytes([254] * 7 + [0])
+FILES = {  # one with files of all kinds
+    "many/a.yaml": SCENARIO,
+    "many/b.yaml": SCENARIO + "obstacles: [{map: used.yaml}]\n",
+    "many/used.pgm": PIXELS,
+    "many/used.yaml": NAV2.replace("nav.pgm", "used.pgm"),
+    "many/nav.pgm": PIXELS,
+    "many/nav.yaml": NAV2,
+    "many/Case0.csv": test_tpcap.CASE,
+    "many/results.csv": "planner,case\nours,1\n",
+    "many/yard.yaml": test_dynobench.PROBLEM,
+    "many/unicycle1_v0.yaml": test_dynobench.MODEL,
+    "many/solution.yaml": "states: [[0, 0, 0]]\nactions: []\n",
+    "many/flat.cfg": test_sbpl_cfg.NAV2D,
+    "many/setup.cfg": "[metadata]\nname = x\n",
+    "many/room.map": test_movingai.MAP,
+    "many/room.map.scen": test_movingai.SCEN,
+    "many/hall.map": test_movingai.MAP,
+    "many/picture.svg": "<svg/>",
+    "many/prims.mprim": "resolution_m: 0.1\n",
+    "many/notes.txt": "nothing to plan",
+    "many/.hidden.yaml": "nonsense",
+    "beside.yaml": BESIDE,
+}
 
 
 @pytest.fixture

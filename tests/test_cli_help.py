@@ -49,10 +49,9 @@ def test_examples_are_commands_with_options_that_exist(example):
 
 
 @pytest.mark.parametrize("example", EXAMPLES["convert"])
-def test_examples_of_conversions_run(example, tmp_path, monkeypatch):
+def test_examples_of_conversions_run(example, folder):
     words = example.split()[1:]
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scenarios").symlink_to(SCENARIOS)
+    (folder / "scenarios").symlink_to(SCENARIOS)
     if Path(words[1]).exists():
         assert run(words) == 0
 
@@ -79,13 +78,12 @@ def test_examples_are_listed_with_a_line_each(capsys):
     assert "parking_loop                mpc   Parallel parking in closed loop" in lines
 
 
-def test_an_example_comes_with_what_it_refers_to(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_an_example_comes_with_what_it_refers_to(folder, capsys):
     assert run(["example", "warehouse"]) == 0
     assert capsys.readouterr().out == (
         "warehouse.yaml: Warehouse; next: maneuver-automaton plan warehouse.yaml\n"
     )
-    written = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*.*"))
+    written = sorted(str(p.relative_to(folder)) for p in folder.rglob("*.*"))
     assert written == ["maps/warehouse.pgm", "maps/warehouse.yaml", "warehouse.yaml"]
     assert ma.load_scenario("warehouse.yaml").problem.obstacles[0].blocked.any()
     assert run(["example", "warehouse"]) == 0  # the same again
@@ -108,8 +106,7 @@ def test_every_example_loads_where_it_was_written(tmp_path):
          "b.yaml: exists already, with other content; need --out with another name"),
     ],
 )  # fmt: skip
-def test_what_is_no_example_is_told(argv, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_what_is_no_example_is_told(argv, said, folder, capsys):
     Path("b.yaml").write_text("mine")
     assert run(["example", *argv]) == 2
     assert capsys.readouterr().err == f"{said}\n"

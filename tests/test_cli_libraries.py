@@ -14,15 +14,7 @@ from tests.formats.test_lattice_files import MPRIM, nav2
 from tests.plotting.cases import assert_picture
 from tests.scenario.files import SCENARIO
 
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a.mprim").write_text(MPRIM)
-    Path("a.nav2.json").write_text(nav2())
-    Path("a.xml").write_text(XML)
-    Path("a.yaml").write_text(SCENARIO)
-    return tmp_path
+FILES = {"a.mprim": MPRIM, "a.nav2.json": nav2(), "a.xml": XML, "a.yaml": SCENARIO}
 
 
 @pytest.mark.parametrize("name", ["a.mprim", "a.nav2.json", "a.xml"])

@@ -25,14 +25,7 @@ CLEAR = HIT.replace("[[0, -3, 0, 0], [2, 9, 0, 0]]", "[[0, -5, 0, 0], [2, -4, 0,
 AHEAD_ONLY = LOOP.replace("    - {name: spin, control: [0.0, 1.0]}\n", "")
 SEEDS = ["--seeds", "2"]
 QUICK = ["--no-plot", "--quiet"]
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with a scenario in it."""
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(LOOP)
-    return tmp_path
+FILES = {"x.yaml": LOOP}
 
 
 def log(out: str = "out") -> dict[str, Any]:

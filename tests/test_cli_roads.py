@@ -12,13 +12,7 @@ from tests.roads.files import GOAL, LANES, car, commonroad, interval, problem
 
 QUICK = ["--no-plot", "--quiet"]
 LATE = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("road.xml").write_text(commonroad())
-    return tmp_path
+FILES = {"road.xml": commonroad()}
 
 
 def test_a_scenario_is_driven(folder, capsys):

@@ -17,13 +17,8 @@ start: {pose: [0, 0, 0]}
 goal: {pose: [1, 0, 0]}
 receding_horizon: {step_s: 0.5}
 """
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    Path("x.yaml").write_text(SCENARIO)
-    return tmp_path
+FILES = {"x.yaml": SCENARIO}
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 @pytest.mark.parametrize(("command", "file"), [("plan", "plan"), ("mpc", "closed_loop")])

@@ -125,9 +125,8 @@ def test_kernels_are_compiled_by_several_processes():
     assert set(seen[-1][0]) == set(seen[-1][1]) == set(few)
 
 
-def test_what_compiles_is_this_package_also_in_the_folder_of_another(tmp_path, monkeypatch):
-    (tmp_path / "maneuver_automaton.py").write_text("raise SystemExit")
-    monkeypatch.chdir(tmp_path)
+def test_what_compiles_is_this_package_also_in_the_folder_of_another(folder):
+    (folder / "maneuver_automaton.py").write_text("raise SystemExit")
     failed = _compile_all.compile_kernels(["no.kernel"], jobs=1)
     assert failed == ["no.kernel: KeyError: 'no.kernel'"]
 

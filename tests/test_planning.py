@@ -83,7 +83,7 @@ def price(problem, one) -> float:
     return float(problem.rates[rows] @ one.durations) + problem.cost.switching(velocities)
 
 
-def assert_consistent(result, *, alternatives=0):
+def assert_consistent(result, *, alternatives=0, price=price):
     problem, horizon = result.problem, result.problem.horizon
     if result.plan is None:
         assert result.status is not PlanStatus.FOUND

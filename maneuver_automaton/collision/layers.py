@@ -19,6 +19,7 @@ from maneuver_automaton.collision.world import NO_SLABS, World
 
 MOST_LAYERS = 24  # more are joined, the thinnest first
 ROUNDED = 1e-8  # [m] by which heights may be off
+OF_EACH = ("time", "pose", "speed", "middle", "reach", "present", "rate", "arcs")  # what moves
 
 
 class LayerArrays(NamedTuple):
@@ -168,15 +169,8 @@ def _all_moving(
         solids=solids,
         first_piece=_offset([one.first_piece for one in moving], begins),
         first_knot=_offset([one.first_knot for one in moving], knots[:-1]),
-        time=np.concatenate([one.time for one in moving]),
-        pose=np.concatenate([one.pose for one in moving]),
-        speed=np.concatenate([one.speed for one in moving]),
-        middle=np.concatenate([one.middle for one in moving]),
-        reach=np.concatenate([one.reach for one in moving]),
-        present=np.concatenate([one.present for one in moving]),
-        rate=np.concatenate([one.rate for one in moving]),
-        arcs=np.concatenate([one.arcs for one in moving]),
         slabs=NO_SLABS._replace(box=np.concatenate([one.slabs.box for one in moving])),
+        **{name: np.concatenate([getattr(one, name) for one in moving]) for name in OF_EACH},
     )
 
 

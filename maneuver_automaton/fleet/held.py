@@ -26,8 +26,6 @@ from maneuver_automaton.automaton.cutting import (
 )
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -38,7 +36,6 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import allowed, within
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, reanchored
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 LEFT = 0.5  # share of a tolerance that is left at least
 CONTACT = 1e-9  # [m] what is closer touches
@@ -143,7 +140,7 @@ def left_to_pay(vehicle: FleetMember, found: OwnPlan, time: float) -> float:
 def goes_on(vehicle: FleetMember, found: OwnPlan, other: OwnPlan, time: float) -> bool:
     """Whether another plan has, at a time [s], the reduced state in which the held one then is."""
     rests = [rest_of_plan(vehicle, one, time) for one in (found, other)]
-    if switches_at_will(vehicle.problem) or not all(one.trims for one in rests):
+    if not vehicle.problem.has_inertia or not all(one.trims for one in rests):
         return True
     return same_state(begin_state(rests[1]), begin_state(rests[0]))
 
@@ -189,7 +186,7 @@ def onward(
         if here is None:
             return None, None
         return _standing(rest, after) if after > NOTHING else None, here
-    if switches_at_will(vehicle.problem):
+    if not vehicle.problem.has_inertia:
         busy, name = after, None
     else:
         known = _next_in_library(vehicle, rest, max(after, after + committed(rest, after)))
@@ -209,7 +206,7 @@ def onward(
 def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | None:
     """The problem from where a plan is over, in a trim like its last; None if there is none."""
     here = own.starting_at(rest.end, time=time)
-    if switches_at_will(own) or not rest.trims:
+    if not own.has_inertia or not rest.trims:
         return here
     state = end_state(rest)
     if same_state(own.first_trim.reduced_state, state):
@@ -246,7 +243,7 @@ def after_head(vehicle: FleetMember, head: Plan | None, found: OwnPlan) -> OwnPl
         return found
     plan = head
     if found.plan.trims:
-        follows = followed_by if switches_at_will(vehicle.problem) else joined
+        follows = joined if vehicle.problem.has_inertia else followed_by
         plan = follows(head, found.plan)
     return vehicle.own(plan, found.goal_index)
 
@@ -262,7 +259,7 @@ def rejoined(
     """
     rest = rest_of_plan(vehicle, found, time)
     if not found.leads:
-        stands = switches_at_will(vehicle.problem) or not moves_on(rest)
+        stands = not vehicle.problem.has_inertia or not moves_on(rest)
         still = replace(rest, start=pose)
         yield resting(vehicle, pose, time, found) if stands else _not_leading(vehicle, still)
         return
@@ -272,7 +269,7 @@ def rejoined(
     well = within(moved.end, with_room(here, tube_m).goals[found.goal_index])
     plans: Iterator[Plan] = iter(())
     if moves_on(rest):
-        aim = aimed_at(rest, goal) if switches_at_will(here) else goal
+        aim = goal if here.has_inertia else aimed_at(rest, goal)
         again = reanchored(here, rest, aim, pad=None, under_way=committed(rest, 0.0) > 0.0)
         plans = (plan for plan in again if allowed(here, plan))
     asis = [moved] if within(moved.end, goal) else []
@@ -283,7 +280,7 @@ def rejoined(
 def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> OwnPlan:
     """The plan that comes to rest soonest; what is held where nothing stops it."""
     rest = rest_of_plan(vehicle, found, time)
-    if switches_at_will(vehicle.problem) or not moves_on(rest):
+    if not vehicle.problem.has_inertia or not moves_on(rest):
         return resting(vehicle, pose, time, found)
     head, problem = onward(vehicle, found, time)
     plans = [_without_coasts(vehicle, rest)]
@@ -355,37 +352,26 @@ def why_not_free(vehicle: FleetMember, course: FleetCourse, keep: float = math.i
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
         until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
         enough = max(keep - CONTACT, CONTACT)
-        if levels is None and _is_free(problem, shapes, motion, until, keep, frame):
-            continue
+        if levels is None:
+            world = world_of(problem.obstacles, shapes, frame, keep=keep)
+            lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
+            free = free_times(
+                world,
+                world.into(motion.pose),
+                twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
+                durations=lasting,
+                margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
+                keep=keep,
+                times=motion.time,
+            )
+            if (free >= lasting).all():
+                continue
         least = nearest_obstacle(
             shapes, motion, problem.obstacles, until=until, levels=levels, enough=enough
         )
         if least.distance <= enough:
             return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
     return ""
-
-
-def _is_free(
-    problem: Problem,
-    shapes: tuple[Shape, ...],
-    motion: Motion,
-    until: float,
-    keep: float,
-    frame: tuple[float, ...],
-) -> bool:
-    """Whether the kernels prove that a body keeps a distance [m] until a time [s]."""
-    world = world_of(problem.obstacles, shapes, frame, keep=keep)
-    lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
-    free = free_times(
-        world,
-        world.into(motion.pose),
-        twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
-        durations=lasting,
-        margin=PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep),
-        keep=keep,
-        times=motion.time,
-    )
-    return bool((free >= lasting).all())
 
 
 def distance_to_obstacles(vehicle: FleetMember, course: FleetCourse) -> float:

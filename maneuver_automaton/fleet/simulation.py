@@ -31,7 +31,6 @@ from maneuver_automaton.fleet.verdict import measured
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.simulation import (
     Disturbance,
     Draw,
@@ -181,7 +180,7 @@ def _upsets(
         else:
             upset = undisturbed if disturbance is None else disturbance
         dof = one.problem.start.size
-        if upset.twist_scale is not None and not switches_at_will(one.problem):
+        if upset.twist_scale is not None and one.problem.has_inertia:
             raise ValueError(
                 "fleet: disturbance: twist_scale is for vehicles without inertia: "
                 "a maneuver is driven as its model says"

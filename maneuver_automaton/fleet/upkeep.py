@@ -22,7 +22,7 @@ from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.receding_horizon.candidates import within
-from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT
 
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
 LOOK_AT = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
@@ -43,7 +43,7 @@ def let_in(now: Moment) -> None:
     agreement, at_first = now.state.agreement, now.state.last is None
     for k in [k for k in now.poses if k not in now.held]:
         vehicle = now.vehicles[k]
-        stands = switches_at_will(vehicle.problem) or vehicle.problem.first_trim.is_rest
+        stands = not vehicle.problem.has_inertia or vehicle.problem.first_trim.is_rest
         choices = [now.resting(k)] if stands else []
         first = now.state.first.pop(k, None)
         if first is not None and now.offset_from(k, first) == 0.0:
@@ -210,7 +210,7 @@ def back_onto(
     and where none of them stays within the tube [m].
     """
     problem = vehicle.problem
-    if not switches_at_will(problem) or pose.size != 3 or problem.horizon.min_coast > 0.0:
+    if problem.has_inertia or pose.size != 3 or problem.horizon.min_coast > 0.0:
         return None
     model = problem.automaton.model
     left = found.plan

@@ -465,7 +465,8 @@ def polish(
     held = held_near(program, point, HELD * reach)
     if fixed_planes and apart.depth(program, point) > TOO_DEEP * reach:
         why = "the guess is too deep inside obstacles for fixed planes"
-        return _polished(point, _nothing(why), len(apart.own), budget.elapsed - began)
+        spent = budget.elapsed - began
+        return Polished._make((*point, *_nothing(why), len(apart.own), spent))
     price = PRICE * float(point.durations.sum()) / reach if elastic else math.inf
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
@@ -542,23 +543,7 @@ def polish(
     lines = len(apart.own)
     if fixed_planes and total.status is SolveStatus.SOLVED:  # free ones that are slack gain nothing
         lines = apart.binding(program, best, TIGHT * reach)
-    return _polished(best, total, lines, max(budget.elapsed - began, needed))
-
-
-def _polished(point: Point, total: SolverAnswer, lines: int, seconds: float) -> Polished:
-    return Polished(
-        status=total.status,
-        reason=total.reason,
-        state=point.state,
-        control=point.control,
-        durations=point.durations,
-        objective=total.objective,
-        is_feasible=total.is_feasible,
-        lines=lines,
-        iterations=total.iterations,
-        build_s=seconds - total.seconds,
-        solve_s=total.seconds,
-    )
+    return Polished._make((*best, *total, lines, max(budget.elapsed - began, needed)))
 
 
 def _parameters(line: IntArray, corner: IntArray) -> list[IntArray]:

@@ -241,21 +241,20 @@ class MotionEnds(NamedTuple):
         return self._replace(start=settled_state(self.start), end=settled_state(self.end))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Polished:
-    """Answer of the solver: states at nodes, controls and durations between them."""
+class Polished(NamedTuple):
+    """A `Point`, a `SolverAnswer`, and what it took to come there."""
 
-    status: SolveStatus
-    reason: str  # the solver's own word
     state: Array  # (n, n_x)
     control: Array  # (n - 1, n_u)
     durations: Array  # (n - 1,) [s]
+    status: SolveStatus
+    reason: str  # the solver's own word
     objective: float
+    iterations: int
+    solve_s: float
     is_feasible: bool  # whether it breaks no condition of the program, solved or not
     lines: int  # that part it from obstacles; of lines that stand still, those that hold it back
-    iterations: int
-    build_s: float
-    solve_s: float
+    seconds: float  # of it all
 
     @property
     def duration(self) -> float:

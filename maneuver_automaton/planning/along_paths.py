@@ -42,6 +42,8 @@ class AlongPaths(PlanningStep):
 
     def offer(self, found: Incumbents) -> None:
         """Offer plans along a first path, then along one that is fast to follow so."""
+        if not found.wants_more:
+            return
         problem, ended, prepared = found.problem, found.ended, found.workspace.prepared
         free, part = kinematic_problem(problem, switch=0.0), found.budget.stage(FIRST_SHARE)
         first = track(free, budget=part, prepared=prepared, patience=AT_ONCE)

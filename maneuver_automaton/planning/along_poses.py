@@ -81,10 +81,6 @@ class AlongPoses(PlanningStep):
 
     answer: Answer
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each leg has a moment."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer a first plan, then the best of the search, then what varying it gains."""
         problem, budget, ended = found.problem, found.budget, found.ended

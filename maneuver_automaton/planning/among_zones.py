@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.cutting import carried, joined
+from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.shapes import origin_near
@@ -30,6 +30,7 @@ from maneuver_automaton.collision.surroundings import fastest_point, parts_of, s
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.checking import bodies_along
 from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, PlanningStep
 from maneuver_automaton.planning.polishing import (
     guess_of_plan,
@@ -61,10 +62,6 @@ class AmongZones(PlanningStep):
     """
 
     search: Answer
-
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each question has a moment."""
-        return True
 
     def offer(self, found: Incumbents) -> None:
         """Offer the answers that keep to all zones, quickened outside of them."""
@@ -379,14 +376,12 @@ def _coast(problem: Problem, zones: list[Zone], begin: Array, end: Array) -> Pla
 
 def _touched(problem: Problem, plan: Plan, times: Array) -> NDArray[np.bool_]:
     """Whether any part comes near each zone at each time (n, zones)."""
-    origin, model = origin_near(plan.start[:2]), problem.automaton.model
-    bodies = [(plan, problem.footprint)]
-    bodies += [(carried(plan, model, name), shapes) for name, shapes in problem.parts.items()]
+    origin, bodies = origin_near(plan.start[:2]), [*bodies_along(problem, plan)]
     columns = []
     for zone in problem.zones:
         near = np.zeros(len(times), dtype=np.bool_)
         around = surroundings_of((Obstacle(zone.shape),), origin)
-        for moving, shapes in bodies:
+        for _, moving, shapes in bodies:
             poses = moving.pose_at(times)[:, :3].copy()
             poses[:, :2] -= origin
             aside = around.nearest(parts_of(shapes), poses, times).distance

@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 import functools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit import Audit, StatedPrices, audit_plan, closest_to
 from maneuver_automaton.automaton import Automaton, Plan, cutting
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.collision import Box, Obstacle, Zone, blocked, fcl_checker
+from maneuver_automaton.collision import Box, Obstacle, Shape, Zone, blocked, fcl_checker
 from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.collision.shapes import origin_near
 from maneuver_automaton.groups import group_of
@@ -139,18 +140,22 @@ def check_plan(
     return Checked(audit=audit, broken=broken, reason=audit.reason)
 
 
+def bodies_along(problem: Problem, plan: Plan) -> Iterator[tuple[str, Plan, tuple[Shape, ...]]]:
+    """What messages call the vehicle and each part it carries, the motion of each, its shapes."""
+    yield "", plan, problem.footprint
+    for name, shapes in problem.parts.items():
+        yield f"the {name}: ", cutting.carried(plan, problem.automaton.model, name), shapes
+
+
 def what_passes_later(problem: Problem, plan: Plan) -> str:
     """What comes too near to a vehicle that stays where its plan ends; empty if nothing does."""
     arrival = plan.start_time + plan.duration
     lasting = problem.quiet_after - arrival if problem.horizon.stay else 0.0
     if not 0.0 < lasting < math.inf:
         return ""
-    bodies = [("", plan.end, problem.footprint)]
-    for name, shapes in problem.parts.items():
-        part = cutting.carried(plan, problem.automaton.model, name)
-        bodies.append((f"the {name}: ", part.end, shapes))
     still = Trim(name="at the goal", body_velocity=np.zeros(3), control=np.zeros(2))
-    for what, pose, shapes in bodies:
+    for what, moved, shapes in bodies_along(problem, plan):
+        pose = moved.end
         stands = Plan(pose[:3], (still,), durations=[lasting], start_time=arrival)
         for layer in layers_of(problem.obstacles, in_space=pose.size > 3):
             height = pose[3:].sum(keepdims=True)
@@ -247,13 +252,10 @@ def _static_hit(
     forbidden = what_zone_forbids(problem, plan, origin_near(goal.pose)) if problem.zones else ""
     if forbidden or not problem.obstacles:
         return forbidden
-    bodies = [("", plan, problem.footprint)]
-    for name, shapes in problem.parts.items():
-        _ask(budget)
-        part = cutting.carried(plan, problem.automaton.model, name)
-        bodies.append((f"the {name}: ", part, shapes))
     layers = layers_of(problem.obstacles, in_space=plan.start.size > 3)
-    for what, moving, shapes in bodies:
+    for what, moving, shapes in bodies_along(problem, plan):
+        if what:
+            _ask(budget)
         for layer in layers:
             for proven in PROVEN:
                 checker = workspace.checker(
@@ -358,12 +360,9 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
     part; of a maneuver, the stretches of its course that are not admitted. Zones are counted from
     `origin` [m], so that no digit is lost.
     """
-    model = problem.automaton.model
-    bodies = [(plan, problem.footprint)]
-    for name, shapes in problem.parts.items():
-        bodies.append((cutting.carried(plan, model, name), shapes))
+    model, bodies = problem.automaton.model, [*bodies_along(problem, plan)]
     for zone in problem.zones:
-        for moving, shapes in bodies:
+        for _, moving, shapes in bodies:
             checker = fcl_checker.FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
             number = _first_forbidden(zone, checker, plan, moving, model)
             if number is not None:

@@ -103,10 +103,6 @@ class AllWords(PlanningStep):
             load_kernels("lattice", "improvement")
         load_search(problem)
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each search has a moment, also where the time is over."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the cheapest ones that stay free and inside, as many as are asked for."""
         problem, ended = found.problem, found.ended
@@ -213,6 +209,8 @@ class FreeWords(PlanningStep):
 
     def offer(self, found: Incumbents) -> None:
         """Offer words as they are found."""
+        if not found.wants_more:
+            return
         problem = found.problem
         guarded = bool(problem.obstacles) or not problem.bounds.are_open
         others = max(found.alternatives, self.others * guarded)
@@ -239,13 +237,11 @@ class LinkedWords(FreeWords):
 class TurnedByManeuvers(PlanningStep):
     """Maneuvers in a row with straight coasts, where no word of trims turns the vehicle."""
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is no plan."""
-        return not found.plans
-
     def offer(self, found: Incumbents) -> None:
         """Offer such words."""
         problem = found.problem
+        if found.plans:
+            return
 
         def plans() -> Iterator[tuple[Plan, int]]:
             for index in goals_left(problem):

@@ -75,10 +75,6 @@ class FromState(PlanningStep):
         if not why_not_polished(problem):
             Polish().prepare(problem, workspace)
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each question has a moment."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the answers with their maneuvers, then all of it polished."""
         problem, budget, ended = found.problem, found.budget, found.ended
@@ -110,9 +106,8 @@ class FromState(PlanningStep):
         ):
             results[k] = result
             offer(result)
-        polish = Polish()
-        if polishes and polish.is_due(found):
-            polish.offer(found)
+        if polishes:
+            Polish().offer(found)
         if not found.plans:
             why = found.why_none(results.values())
             if why is None and results:  # proven from one trim, and not from another

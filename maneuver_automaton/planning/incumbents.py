@@ -445,10 +445,6 @@ class PlanningStep(Protocol):
         """Have ready what it needs before the clock runs; True if later steps need nothing."""
         return None
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether it is tried after what was found: by default if more is asked for, in time."""
-        return found.wants_more
-
     def offer(self, found: Incumbents) -> None:
-        """Offer plans as they are found, within the budget of the incumbents."""
+        """Offer plans as they are found, if more of them are due, within the budget."""
         raise NotImplementedError

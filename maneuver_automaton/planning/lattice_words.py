@@ -109,6 +109,8 @@ class LatticeWords(PlanningStep):
         Where no plan fits but one nearly does, which polishing may mend, it does not wait for all
         that the lattice tries: each has its share, and the lattice what is left.
         """
+        if not found.wants_more:
+            return
         ended, known = found.ended, bool(found.plans)
         soon = self.polish is not None and (known or found.misfits)
         self.search(found, share=BEFORE_POLISHING if soon else 1.0)

@@ -49,7 +49,7 @@ class AnyPlanner(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Asked:
+class Asked:
     """Everything that is asked, and how to answer it."""
 
     planner: AnyPlanner | None
@@ -133,29 +133,11 @@ def plan_many(
     >>> [round(cost, 6) for cost in plan_many(problems, take=lambda result: result.cost)]
     [1.0, 2.0]
     """
-    asked = _Asked(None, list(problems), as_number("time_limit", time_limit), take)
-    return _answers(asked, jobs, scheduler, journal, progress)
+    asked = Asked(None, list(problems), as_number("time_limit", time_limit), take)
+    return answers(asked, jobs, scheduler, journal, progress)
 
 
-def plan_many_on(
-    planner: AnyPlanner,
-    starts: ArrayLike,
-    goals: Goals,
-    *,
-    time_limit: float,
-    jobs: int,
-    scheduler: str | None,
-    take: Take | None,
-    journal: str | Path | None,
-    progress: Callable[[int, int], None] | None,
-) -> Iterator[Any]:
-    """The answers of a planner to many queries: see `Planner.plan_many`."""
-    time_limit = as_number("time_limit", time_limit)
-    asked = _Asked(planner, _queries(planner, starts, goals), time_limit, take)
-    return _answers(asked, jobs, scheduler, journal, progress)
-
-
-def _queries(planner: AnyPlanner, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
+def queries_of(planner: AnyPlanner, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
     """Starts (n, dof) and as many goals; one start or one goal serves all."""
     dof = planner.stated["automaton"].model.group.dof
     places = np.atleast_2d(as_array("starts", starts, last=dof))
@@ -175,13 +157,14 @@ def _queries(planner: AnyPlanner, starts: ArrayLike, goals: Goals) -> tuple[Arra
     return np.array(np.broadcast_to(places, (n, dof))), aims * (n if len(aims) == 1 else 1)
 
 
-def _answers(
-    asked: _Asked,
+def answers(
+    asked: Asked,
     jobs: int,
     scheduler: str | None,
     journal: str | Path | None,
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Any]:
+    """The answers to all that is asked, in its order; see `plan_many`."""
     jobs = as_whole("jobs", jobs)
     check_range("time_limit", asked.time_limit, unit="s", infinite=True)
     if journal is not None and asked.take is None:
@@ -239,7 +222,7 @@ def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
     """The answers to some queries in another process: what both have already is named, not sent."""
     common, packed, time_limit, take = piece
     queries: Queries = pickle.loads(packed)
-    asked = _Asked(_planner_of(common), queries, time_limit, take)
+    asked = Asked(_planner_of(common), queries, time_limit, take)
     file = io.BytesIO()
     _Sender(file, asked.shared(queries)).dump(asked.answers(queries))
     return file.getvalue()
@@ -306,7 +289,7 @@ def _dumped(value: Any) -> bytes:
     return bytes(dumps(value))
 
 
-def _digest(asked: _Asked) -> str:
+def _digest(asked: Asked) -> str:
     """What tells queries from others, here and in a later process."""
     import joblib
 

@@ -50,10 +50,6 @@ class OnStateLattice(PlanningStep):
         graph = graph_of(lasting, goals, workspace.on(lasting.obstacles).prepared)
         return graph is not None and lasting is problem
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: what is blocked, and what there is no time for, is told."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the cheapest path of the graph."""
         problem, budget, ended = found.problem, found.budget, found.ended

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import plain_numbers
+from maneuver_automaton._arrays import as_number, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
@@ -26,7 +26,7 @@ from maneuver_automaton.collision import (
 )
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.places import PlaceCost, check_place_costs
-from maneuver_automaton.planning.many import plan_many_on
+from maneuver_automaton.planning.many import Asked, answers, queries_of
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings, Via
@@ -102,7 +102,8 @@ class Planner:
         last = automaton.trim_names[0] if named else None
         here = origin_of(automaton, automaton.trims[0])
         aim = Goal(pose=np.where(np.arange(here.size) == 2, here, 1.0), trim=last)
-        first = self._problem(here, aim, start_trim=self.start_trim or last)
+        asked = {"start": here, "goals": aim, "start_trim": self.start_trim or last}
+        first = Problem(**self.stated | asked)
         object.__setattr__(self, "_first", first)
         prepare(first, self.workspace)
 
@@ -127,38 +128,18 @@ class Planner:
         order: str = "given",
     ) -> Problem:
         """The problem of one query; `start_trim` or `start_state` goes before the planner's own."""
-        one = self._between(start, goals, start_time, start_trim, start_state)
+        if start_trim is None and start_state is None:
+            start_trim = self.start_trim
+        if start_trim is None and start_state is None and self._first.start_trim is not None:
+            asked = {"start": start, "goals": goals, "start_time": start_time, "start_trim": None}
+            one = Problem(**self.stated | asked)
+        else:
+            one = self._first.starting_at(
+                start, time=start_time, goals=goals, trim=start_trim, state=start_state
+            )
         on_the_way: Any = via
         passes = bool(via) if isinstance(via, tuple) else len(np.atleast_1d(on_the_way)) > 0
         return replace(one, via=on_the_way, order=order) if passes else one
-
-    def _between(
-        self,
-        start: ArrayLike,
-        goals: ArrayLike | Goal | Sequence[Goal],
-        start_time: float,
-        start_trim: str | None,
-        start_state: ArrayLike | Mapping[str, float] | None,
-    ) -> Problem:
-        if start_state is not None:
-            return self._first.starting_at(
-                start, time=start_time, goals=goals, trim=start_trim, state=start_state
-            )
-        trim = self.start_trim if start_trim is None else start_trim
-        if trim is None and self._first.start_trim is not None:
-            return self._problem(start, goals, start_time=start_time, start_trim=None)
-        return self._first.starting_at(start, time=start_time, goals=goals, trim=trim)
-
-    def _problem(
-        self,
-        start: ArrayLike,
-        goals: ArrayLike | Goal | Sequence[Goal],
-        *,
-        start_time: float = 0.0,
-        start_trim: str | None,
-    ) -> Problem:
-        asked = {"start": start, "goals": goals, "start_time": start_time, "start_trim": start_trim}
-        return Problem(**self.stated | asked)
 
     def plan(
         self,
@@ -226,17 +207,9 @@ class Planner:
         >>> [round(result.cost, 6) for result in answers]
         [1.0, 2.0]
         """
-        return plan_many_on(
-            self,
-            starts,
-            goals,
-            time_limit=time_limit,
-            jobs=jobs,
-            scheduler=scheduler,
-            take=take,
-            journal=journal,
-            progress=progress,
-        )
+        queries = queries_of(self, starts, goals)
+        asked = Asked(self, queries, as_number("time_limit", time_limit), take)
+        return answers(asked, jobs, scheduler, journal, progress)
 
     def with_obstacles(
         self, obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape]

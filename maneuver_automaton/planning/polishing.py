@@ -136,14 +136,11 @@ class Polish(PlanningStep):
         for library in along.libraries if along else ():
             cost_to_go_table(simpler_problem(problem, library, cost=BY_TIME))
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is time for more than checks, and a plan that is new, or none."""
-        over = found.for_better.is_over or found.is_enough
-        return not (over or found.cost == self.tried < math.inf)
-
     def offer(self, found: Incumbents) -> None:
         """Offer what polishing finds in all the time that is left."""
         known = found.cost
+        if found.for_better.is_over or found.is_enough or known == self.tried < math.inf:
+            return  # no time for more than checks, or no plan that is new
         self.polish(found)
         if self.otherwise and found.cost == known and not found.budget.is_over:
             self.otherwise()

@@ -80,7 +80,7 @@ def answer(
     ended = found.ended
     try:
         for step in steps:
-            if not ended.is_complete and step.is_due(found):
+            if not ended.is_complete:
                 step.offer(found)
     finally:
         if ended.begun is not None:  # whose memory serves the next query
@@ -224,10 +224,6 @@ def _steers(automaton: Automaton) -> tuple[bool, bool]:
 class FreeEnds(PlanningStep):
     """Tell where no vehicle can be; where all ends are free, begin the search of the lattice."""
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer nothing, but a verdict."""
         problem, ended = found.problem, found.ended
@@ -241,10 +237,6 @@ class FreeEnds(PlanningStep):
 class NearlyMet(PlanningStep):
     """What meets a goal for the checks, however far an exact end is from it."""
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the first that passes the checks."""
         found.offer_nearly_met()
@@ -253,13 +245,11 @@ class NearlyMet(PlanningStep):
 class BestTimes(PlanningStep):
     """The cheapest plan with the best of its coasting times, by what its places cost."""
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether places cost something, and there is time to make a plan better."""
-        placed, better = found.problem.place_costs, found.problem.search.improve
-        return bool(placed and better and found.plans) and not found.budget.is_over
-
     def offer(self, found: Incumbents) -> None:
         """Offer such plans as long as they save enough; they are checked as others are."""
+        placed, improves = found.problem.place_costs, found.problem.search.improve
+        if not (placed and improves and found.plans) or found.budget.is_over:
+            return
         before = math.inf
         while found.cost < before * (1.0 - SAVING) and found.may_check:
             before, best = found.cost, found.plans[0]
@@ -280,13 +270,10 @@ class Checks(PlanningStep):
             load_kernels("times")
             bounds.least_price_per_metre(problem.automaton, problem.cost)
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is time."""
-        return not found.budget.is_over
-
     def offer(self, found: Incumbents) -> None:
         """Offer nothing."""
-        load_checks(found.problem, found.workspace)
+        if not found.budget.is_over:
+            load_checks(found.problem, found.workspace)
 
 
 def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:

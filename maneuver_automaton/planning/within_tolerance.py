@@ -49,10 +49,6 @@ class WithinTolerance(PlanningStep):
 
     answer: Answer
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Always: each question has a moment."""
-        return True
-
     def offer(self, found: Incumbents) -> None:
         """Offer the answers, their ends let loose."""
         problem, budget, ended = found.problem, found.budget, found.ended

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
@@ -168,9 +168,8 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
             scale = 1.0 + float(np.abs(one.pose[-1]).max())
             off = np.abs(one.pose[-1] - piece.pose[0]).max() > END_TOLERANCE * scale
             if one is not piece and one.name == piece.name and not (late or off):
-                pieces[-1] = TrackPiece(
-                    name=one.name,
-                    twist=one.twist,
+                pieces[-1] = replace(
+                    one,
                     time=np.concatenate([one.time, piece.time[1:]]),
                     pose=np.concatenate([one.pose, piece.pose[1:]]),
                     control=np.concatenate([one.control, piece.control[1:]]),

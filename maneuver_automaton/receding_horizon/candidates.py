@@ -22,7 +22,7 @@ from maneuver_automaton.receding_horizon.rest_of_plan import (
     moving_pieces,
     rest_of,
 )
-from maneuver_automaton.receding_horizon.settings import EXACT, Settings, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.refinement.retiming import effort_report, retime
 from maneuver_automaton.refinement.shooting import least_effort
 from maneuver_automaton.search.choose import search_goal
@@ -191,7 +191,7 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> StepPlan | No
     The cheapest that stays in the set all along and does not linger at its edge, otherwise one that
     is inside whenever the loop closes; None if there is neither, or trims are not switched at will.
     """
-    if not switches_at_will(here):
+    if here.has_inertia:
         return None
     goal = here.goals[goal_index]
     middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)

@@ -16,7 +16,6 @@ from maneuver_automaton.costs import Cost, prices_switches, terms_of
 from maneuver_automaton.planning.proving import Proving, in_costs
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.search.limits import rest_rate
 
 ACCURACY = 1e-9  # relative, of values
@@ -91,7 +90,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
     rates = problem.rates
     rest = rest_rate(problem) or 0.0
     stays = any(one.stay_s for one in problem.via)
-    steady = switches_at_will(problem) and not problem.zones and not stays
+    steady = not problem.has_inertia and not problem.zones and not stays
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None

@@ -25,7 +25,6 @@ from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, bo
 from maneuver_automaton.receding_horizon.failsafe import FailSafe, Mitigation, settled
 from maneuver_automaton.receding_horizon.log import Decision, Origin
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, rested
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import NEARLY, StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
@@ -302,7 +301,7 @@ class OverManeuvers(StepSearch):
 def needs_maneuvers(problem: Problem) -> bool:
     """Whether plans are words with maneuvers, or obey conditions unknown to the other searches."""
     unfilled = problem.horizon.time is not None and problem.automaton.rest is None
-    if not switches_at_will(problem) or unfilled:
+    if problem.has_inertia or unfilled:
         return True
     return bool(problem.zones) or problem.climbs_among_obstacles
 

@@ -18,7 +18,6 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup, sub_library
 from maneuver_automaton.search.words import search_setup_words
@@ -188,7 +187,7 @@ def reanchored(
     same = same_word(problem, plan, goal, pad=pad, under_way=under_way)
     if same is not None:
         yield same
-    if switches_at_will(problem):
+    if not problem.has_inertia:
         yield from rejoining(problem, plan, goal, pad=pad)
     elif goal.tolerance_m or goal.tolerance_rad:
         from_here = replace(plan, start=problem.start)

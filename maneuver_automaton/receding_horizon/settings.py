@@ -70,7 +70,7 @@ class Settings:
         """Raise ValueError if plans of a problem cannot be driven with other controls."""
         what = "plans with pieces" if self.pieces else "retimed plans"
         terms = terms_of(problem.cost)
-        if not switches_at_will(problem) or problem.zones or problem.climbs_among_obstacles:
+        if problem.has_inertia or problem.zones or problem.climbs_among_obstacles:
             raise ValueError(
                 f"receding horizon: {'pieces are' if self.pieces else 'retimed is'} for vehicles "
                 "without inertia, and no zones or heights: at another pace a maneuver leads "
@@ -96,21 +96,13 @@ class Settings:
             )
 
 
-def switches_at_will(problem: Problem) -> bool:
-    """Whether the vehicle may change to any trim of its library, and so stop, at any moment.
-
-    Then nothing is ever committed, and a motion may end anywhere.
-    """
-    return not problem.has_inertia
-
-
 def filling_rest(problem: Problem) -> Trim | None:
     """The cheapest rest of the library, which fills a fixed time; None if no plan may end in it.
 
     Where trims are not switched at will, a plan ends in the goal's trim.
     """
     moving = [not problem.last_trim(goal).is_rest for goal in problem.goals if goal.trim]
-    if any(moving) and not switches_at_will(problem):
+    if any(moving) and problem.has_inertia:
         return None
     still = np.flatnonzero(~problem.automaton.body_velocities.any(axis=1))
     if not still.size:

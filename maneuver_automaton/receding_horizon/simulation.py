@@ -37,7 +37,6 @@ from maneuver_automaton.receding_horizon.controller import RecedingHorizon
 from maneuver_automaton.receding_horizon.failsafe import settled
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
-from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -241,7 +240,7 @@ def simulate(
         look_ahead=look_ahead,
         stand=stand,
     )
-    stops_at_will = switches_at_will(problem)
+    stops_at_will = not problem.has_inertia
     if upset.twist_scale is not None and not stops_at_will:
         raise ValueError(
             "receding horizon: disturbance: twist_scale is for vehicles without inertia: "

@@ -46,7 +46,7 @@ from maneuver_automaton.receding_horizon.rest_of_plan import (
     rested,
     same_word,
 )
-from maneuver_automaton.receding_horizon.settings import EXACT, Settings, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.search.result import TIE
 
 FINISHED = 2  # candidates of a step for which controls between those of the library are sought
@@ -192,7 +192,7 @@ class Situation:
     def may_rest(self) -> bool:
         """Whether the vehicle may end its drive here: it switches at will, or its plan is over."""
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return (switches_at_will(self.here) and not fixed) or self.is_over
+        return (not self.here.has_inertia and not fixed) or self.is_over
 
     def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""
@@ -231,7 +231,7 @@ class Situation:
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
-        if pad is not None and not switches_at_will(here):
+        if pad is not None and here.has_inertia:
             pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)
@@ -274,18 +274,14 @@ class Situation:
                     yield again, Origin.REANCHORED
             yield self.rest, Origin.SHIFTED
             return
-        known, then = self._until_next(self.planned())
+        known, then = self.until_next()
         aim = goal if then is None else Goal(then.start, trim=then.trims[0].name)
         for plan in reanchored(here, known, aim, pad=pad, under_way=under_way):
             yield plan if then is None else followed_by(plan, then), Origin.REANCHORED
 
-    @property
-    def after_next(self) -> Plan | None:
-        """The last plan after the next pose on the way; None if it leads past none."""
-        return self._until_next(self.planned())[1]
-
-    def _until_next(self, plan: Plan) -> tuple[Plan, Plan | None]:
-        """A plan to the next pose on the way that it passes, and its rest; None if it is whole."""
+    def until_next(self) -> tuple[Plan, Plan | None]:
+        """The last plan to the next pose on the way, and its rest; None if it leads past none."""
+        plan = self.planned()
         ahead = [one.time - plan.start_time for one in passed_on_the_way(self.here, plan)]
         if not ahead or committed(plan, ahead[0]) > NOTHING:
             return plan, None

@@ -7,7 +7,7 @@ and what proves that they are free, is said by its kinds.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
@@ -28,7 +28,7 @@ from maneuver_automaton.receding_horizon.failsafe import (
 )
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, first_part
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
-from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.receding_horizon.situation import Situation
 
 LEAST_AHEAD = 1e-9  # [s] that a fail-safe trajectory covers at least
@@ -40,9 +40,18 @@ NEARLY = 0.98  # of the free part of a path, after which there is room to stand
 class StepSearch:
     """One step: which plans lead to the goal, which are safe, and what is driven otherwise.
 
-    All plans start with the committed part of the last one. A kind says `may_end`, `is_free`,
-    `cheaper`, `otherwise`, `why_none` and `fail_safe`.
+    All plans start with the committed part of the last one. A kind says what follows; those for
+    free space need neither `leaving` nor `heedless`.
     """
+
+    is_free: Callable[[Plan], bool]  # whether all of a plan is free
+    may_end: Callable[[Plan], bool]  # and the vehicle may stay at its end, or leave it safely
+    cheaper: Callable[[StepPlan | None], list[StepPlan]]  # safe ones, if some cost less than it
+    otherwise: Callable[[], StepPlan | None]  # safe, where there is none: late, or searched longer
+    why_none: Callable[[], str]  # why there is no plan to the goal
+    fail_safe: Callable[[], Iterator[tuple[Plan, Decision]]]  # trajectories; the first is driven
+    leaving: Callable[[Plan], FailSafe | None]  # fail-safe, from the end of a piece
+    heedless: Callable[[Problem], Plan | None]  # a plan to its goal, of it without what moves
 
     improves = False  # whether it starts from the plan that is kept, so that any safe one will do
     finds_words = True  # of the library: of others no bound is known in closed form
@@ -58,40 +67,6 @@ class StepSearch:
         self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
         self.tried: list[Plan] = []  # motions that are not free for long enough
         self.reason = ""  # why a planner finds nothing
-
-    # --- what a kind says ---
-
-    def is_free(self, plan: Plan) -> bool:
-        """Whether all of a plan is free."""
-        raise NotImplementedError
-
-    def may_end(self, plan: Plan) -> bool:
-        """Whether a plan is free, and the vehicle may stay at its end or leave it safely."""
-        raise NotImplementedError
-
-    def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
-        """Safe plans, which may cost less than the one that is kept."""
-        raise NotImplementedError
-
-    def otherwise(self) -> StepPlan | None:
-        """A safe plan where none is kept and none was found: late, or from a longer search."""
-        raise NotImplementedError
-
-    def why_none(self) -> str:
-        """Why there is no plan to the goal."""
-        raise NotImplementedError
-
-    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
-        """Fail-safe trajectories with their decisions; the first one is driven."""
-        raise NotImplementedError
-
-    def leaving(self, piece: Plan) -> FailSafe | None:
-        """A fail-safe trajectory from the end of a piece of plan; None if there can be none."""
-        raise NotImplementedError
-
-    def heedless(self, static: Problem) -> Plan | None:
-        """A plan to the goal of the problem without what moves in it."""
-        raise NotImplementedError
 
     def onward(self) -> Problem | None:
         """The problem that a search is asked; None if there is none."""
@@ -148,7 +123,7 @@ class StepSearch:
         followed = kept is not None and not (self.now.off_plan or self.now.changed)
         if followed and not self.here.moves:
             return []
-        then = self.now.after_next
+        _, then = self.now.until_next()
         found = None
         if kept is None and then is not None:
             found = self.planned_anew(0.5, improve=False, then=then)
@@ -247,7 +222,7 @@ class StepSearch:
                 return one
             safe.append(one)
         near = within(rest.end, now.here.goals[last.goal_index])
-        if near and not (safe and switches_at_will(now.here)) and self.is_safe(rest):
+        if near and not (safe and not now.here.has_inertia) and self.is_safe(rest):
             return now.candidate(rest, last.goal_index, Origin.SHIFTED)
         return min(safe, key=lambda one: one.cost, default=None)
 

@@ -20,7 +20,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.models import Car, Model, Unicycle
 from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.scene import Polished
+from maneuver_automaton.optimal_control.scene import Point, Polished
 from maneuver_automaton.problem import STANDING, Problem
 from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
@@ -141,7 +141,7 @@ def _strokes(plan: Plan) -> Array:
     return np.add.reduceat(lengths, begins)
 
 
-def gears_of(model: Model, guess: Guess | Polished) -> Array:
+def gears_of(model: Model, guess: Guess | Point | Polished) -> Array:
     """Sign (n - 1,) of the speed ahead in every interval; where it is zero, that of the next."""
     signs = np.sign(_speeds(model, guess)[:, 0])
     for k in range(len(signs) - 2, -1, -1):
@@ -151,7 +151,7 @@ def gears_of(model: Model, guess: Guess | Polished) -> Array:
     return np.where(signs == 0.0, 1.0, signs)
 
 
-def without_shuffles(model: Model, found: Polished, shortest: float) -> Array | None:
+def without_shuffles(model: Model, found: Point | Polished, shortest: float) -> Array | None:
     """Gears (n - 1,) without stretches shorter than `shortest` [m]; None if there are none.
 
     A solver may go back and forth by millimetres about a change of direction, which gains nothing.
@@ -179,7 +179,7 @@ def _merged(gears: Array, driven: Array, shortest: float) -> Array:
         gears[begins[least] : [*begins, len(gears)][least + 1]] *= -1.0
 
 
-def _speeds(model: Model, motion: Guess | Polished) -> Array:
+def _speeds(model: Model, motion: Guess | Point | Polished) -> Array:
     """Mean body velocities (n - 1, dof) in every interval."""
     reduced = motion.state[:, model.group.dof :]
     begin = model.body_velocity(reduced[:-1], motion.control)

@@ -412,8 +412,8 @@ class _Polishing:
         raw = self.best_raw
         if raw is None or self._is_over() or np.ptp(raw.durations) > EVEN:
             return
-        work, took = self._work_left(), raw.build_s + raw.solve_s
-        if self._left() < 3.0 * took if work is None else work < 3 * raw.iterations:
+        work = self._work_left()
+        if self._left() < 3.0 * raw.seconds if work is None else work < 3 * raw.iterations:
             return
         steps = max(self.steps[self.best_guess], len(raw.durations))
         count = math.ceil(steps / FINER)
@@ -459,7 +459,7 @@ class _Polishing:
             begin=begin,
             budget=self.budget,
         )
-        self.building = max(self.building, found.build_s)
+        self.building = max(self.building, found.seconds - found.solve_s)
         self.attempts.append(
             Attempt(
                 guess=number,

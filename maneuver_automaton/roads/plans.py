@@ -188,12 +188,12 @@ class RoadDecision:
 
     def tail(self, ticks: int) -> RoadDecision:
         """The rest of the plan some ticks later."""
-        return RoadDecision(
+        return replace(
+            self,
             tick=self.tick + ticks,
             states=self.states[ticks:],
             controls=self.controls[ticks:],
             lasting=max(self.lasting - ticks, 0),
-            reaches=self.reaches,
         )
 
     def then(self, other: RoadDecision, *, after: int) -> RoadDecision:

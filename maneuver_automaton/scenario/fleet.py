@@ -19,7 +19,7 @@ from maneuver_automaton.formats.statement import MapFile, Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, check_names
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon import settings, simulation
+from maneuver_automaton.receding_horizon import simulation
 from maneuver_automaton.scenario.parts import (
     Count,
     FilePart,
@@ -369,7 +369,7 @@ def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> Non
             where = where if own is None else ("vehicles", k, *where)
             with at(document, where):
                 simulation.checked(disturbance_of(noise), problem.start.size)
-                if noise.twist_scale is not None and not settings.switches_at_will(problem):
+                if noise.twist_scale is not None and problem.has_inertia:
                     raise ValueError(
                         f"twist_scale: got {list(noise.twist_scale)}, need no such key for a "
                         "vehicle with inertia: a maneuver is driven as its model says"

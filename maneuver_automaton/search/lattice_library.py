@@ -31,6 +31,7 @@ from maneuver_automaton.search.lattice_trims import (
     TURN,
     Chosen,
     PricedTrims,
+    Times,
     priced_library,
     switched_in_plane,
     trims_at_will,
@@ -161,17 +162,16 @@ def library_with(problem: Problem, choice: Chosen) -> LatticeLibrary:
     return _library(problem.automaton, *_asked(problem), choice)
 
 
-def _asked(
-    problem: Problem,
-) -> tuple[StageCost, tuple[Shape, ...], Carried, bool, bool, float, bool, bool]:
+def _asked(problem: Problem) -> tuple[StageCost, tuple[Shape, ...], Carried, Times]:
     """What a library depends on beside its automaton, as `_library` takes it."""
     carried, horizon, terms = tuple(problem.parts.items()), problem.horizon, terms_of(problem.cost)
     fixed = horizon.time is not None
     limited = fixed or horizon.max_time is not None
     priced = terms is not None and (terms.switch > 0.0 or terms.direction_change > 0.0)
     few = horizon.max_trims is not None or horizon.min_coast > 0.0
-    times = fixed, problem.moves, horizon.min_coast, limited, not limited and (priced or few)
-    return (problem.cost, problem.footprint, carried, *times)
+    saving = not limited and (priced or few)
+    times = Times(fixed, problem.moves, float(horizon.min_coast), limited, saving)
+    return problem.cost, problem.footprint, carried, times
 
 
 def _library(
@@ -179,28 +179,15 @@ def _library(
     cost: StageCost,
     footprint: tuple[Shape, ...],
     carried: Carried,
-    fixed_time: bool,
-    waits: bool,
-    min_coast: float,
-    limited: bool,
-    saving: bool,
+    times: Times,
     choice: Chosen | None = None,
 ) -> LatticeLibrary:
     if switched_in_plane(automaton):
-        trims = trims_at_will(
-            automaton,
-            cost,
-            fixed_time=fixed_time,
-            waits=waits,
-            min_coast=min_coast,
-            limited=limited,
-            saving=saving,
-            choice=choice,
-        )
+        trims = trims_at_will(automaton, cost, times, choice)
     else:
         trims = trims_of(priced_library(automaton, cost), cost)
     parts = posed_parts(automaton, footprint, dict(carried), trims.library.trims)
-    return library_of_trims(trims, parts, waits=waits)
+    return library_of_trims(trims, parts, waits=times.waits)
 
 
 def library_of_trims(

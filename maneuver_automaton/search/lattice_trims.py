@@ -52,38 +52,38 @@ class Chosen(NamedTuple):
     others: tuple[int, ...] = ()  # that a known word has beside them
 
 
+class Times(NamedTuple):
+    """What a problem asks of the times of trims, as far as the trims taken depend on it."""
+
+    fixed: bool  # in all: rest pads it
+    waits: bool  # rest is a trim like any other, since obstacles move
+    min_coast: float  # [s]
+    limited: bool  # in all: the fastest trims of a large library are taken
+    saving: bool  # one trim is worth more than two that do the same by turns: more are taken
+
+
 def trims_at_will(
-    automaton: Automaton,
-    cost: StageCost,
-    *,
-    fixed_time: bool,
-    waits: bool,
-    min_coast: float,
-    limited: bool = False,
-    saving: bool = False,
-    choice: Chosen | None = None,
+    automaton: Automaton, cost: StageCost, times: Times, choice: Chosen | None
 ) -> PricedTrims:
     """The most useful trims in the plane of a vehicle that switches at will between all.
 
-    `waits`: rest is a trim like any other, since obstacles move; `limited`: so is the time, and
-    the fastest trims of a large library are taken; `saving`: one trim is worth more than two that
-    do the same by turns, and more of them are taken. A `choice` says which are taken instead.
+    A `choice` says which are taken instead.
     """
     known = moving_trims(automaton, cost)
-    pads = fixed_time and known.rest is not None
+    pads = times.fixed and known.rest is not None
     rates = known.rates - (known.rest_rate if pads else 0.0)
     if choice is not None:
         chosen = np.flatnonzero(np.isin(known.trims, choice.words + choice.others))
-    elif len(known.trims) <= (MOST_SAVING if saving else MOST_TRIMS):
+    elif len(known.trims) <= (MOST_SAVING if times.saving else MOST_TRIMS):
         chosen = np.arange(len(known.trims))
     else:
-        paid = np.ones(len(rates)) if limited else rates
-        chosen = coarse_trims(known.twists, paid, directions=DENSE if saving else DIRECTIONS)
+        paid = np.ones(len(rates)) if times.limited else rates
+        chosen = coarse_trims(known.twists, paid, directions=DENSE if times.saving else DIRECTIONS)
     trims = known.trims[chosen]
     twists, rates = known.twists[chosen, :3], rates[chosen]
     twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
     spins = bool((~twists[:, :2].any(axis=1) & (twists[:, 2] != 0.0)).any())
-    if waits and known.rest is not None:
+    if times.waits and known.rest is not None:
         trims = np.append(trims, known.rest)
         twists = np.vstack([twists, np.zeros(3)])
         rates = np.append(rates, 0.0 if pads else known.rest_rate)
@@ -104,7 +104,7 @@ def trims_at_will(
             transitions=identities(automaton),
             maneuver_costs=np.zeros(0),
             arrays=with_words(
-                _with_prices(arrays, cost)._replace(min_coast=float(min_coast)),
+                _with_prices(arrays, cost)._replace(min_coast=times.min_coast),
                 words,
                 len(words),
                 np.array(pairs, dtype=np.int64).reshape(-1, 3),

@@ -72,13 +72,12 @@ def test_a_trim_is_named_by_a_text():
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
-def test_pipes_and_devices_are_no_files(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_pipes_and_devices_are_no_files(folder, capsys):
     for name in ("a.yaml", "a.csv", "a.json", "a.xml", "a.svg", "a.cfg"):
         os.mkfifo(name)
         assert "it is a pipe or a device, need a file" in said(capsys, "check", name)
         assert said(capsys, "automaton", "show", name)
-    (tmp_path / "z.yaml").symlink_to("/dev/zero")
+    (folder / "z.yaml").symlink_to("/dev/zero")
     assert "a pipe or a device" in said(capsys, "plan", "z.yaml")
     assert "a pipe or a device" in said(capsys, "plot", "z.yaml")
 
@@ -87,34 +86,29 @@ def test_pipes_and_devices_are_no_files(tmp_path, monkeypatch, capsys):
     ("secret", "asked"),
     [("root:x:0:0:root:/root\n", "is no map"), ("password: hunter2\n", "is no map")],
 )
-def test_an_error_about_a_map_does_not_tell_what_a_file_holds(
-    tmp_path, monkeypatch, capsys, secret, asked
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "secret").write_text(secret)
-    (tmp_path / "x.yaml").write_text(SCENARIO + "obstacles: [{map: secret}]\n")
+def test_an_error_about_a_map_does_not_tell_what_a_file_holds(folder, capsys, secret, asked):
+    (folder / "secret").write_text(secret)
+    (folder / "x.yaml").write_text(SCENARIO + "obstacles: [{map: secret}]\n")
     line = said(capsys, "check", "x.yaml")
     assert asked in line
     assert not any(word in line for word in ("root", "hunter2", "password"))
 
 
-def test_a_name_that_is_too_long(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "x.yaml").write_text(SCENARIO + f"obstacles: [{{map: {'x' * 5000}}}]\n")
+def test_a_name_that_is_too_long(folder, capsys):
+    (folder / "x.yaml").write_text(SCENARIO + f"obstacles: [{{map: {'x' * 5000}}}]\n")
     assert "File name too long" in said(capsys, "check", "x.yaml")
     assert "File name too long" in said(capsys, "plan", "y" * 5000)
     with pytest.raises(InvalidScenario, match="File name too long"):
-        read_text(tmp_path / ("z" * 300))
+        read_text(folder / ("z" * 300))
 
 
-def test_a_library_with_numbers_of_forty_digits(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "x.yaml").write_text(SCENARIO)
+def test_a_library_with_numbers_of_forty_digits(folder, capsys):
+    (folder / "x.yaml").write_text(SCENARIO)
     assert run(["automaton", "build", "x.yaml", "-o", "x.json", "--quiet"]) == 0
-    document = json.loads((tmp_path / "x.json").read_text())
+    document = json.loads((folder / "x.json").read_text())
     del document["hash"]
     for change in ({"name": 7}, {"name": 10**40}, {"control": [10**40, 0]}, {"control": 10**400}):
         bad = json.loads(json.dumps(document))
         bad["trims"][1].update(change)
-        (tmp_path / "y.json").write_text(json.dumps(bad))
+        (folder / "y.json").write_text(json.dumps(bad))
         assert said(capsys, "automaton", "show", "y.json").startswith("y.json: ")

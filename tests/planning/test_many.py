@@ -151,8 +151,7 @@ def test_problems_of_any_kind_have_the_answers_of_each():
         ({"journal": "some.jsonl"}, "need take="),
     ],
 )
-def test_wrong_queries_are_refused_at_once(change, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_wrong_queries_are_refused_at_once(change, message, folder):
     if "scheduler" in change:
         pytest.importorskip("distributed")
     call = functools.partial(planner().plan_many, **{"starts": STARTS, "goals": GOALS, **change})

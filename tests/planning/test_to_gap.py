@@ -43,8 +43,7 @@ def test_counted_work_proves_the_same_and_leaves_the_plan_as_it_is():
     assert first.lower_bound > alone.lower_bound
 
 
-def test_the_command_line_says_and_draws_what_is_proven(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_line_says_and_draws_what_is_proven(folder, capsys):
     scenario = Path(__file__).parents[2] / "scenarios" / "car_slot.yaml"
     assert run(["plan", str(scenario), "--gap", "0.05", "--time-limit", "30"]) == 0
     assert "proven optimal" in capsys.readouterr().out

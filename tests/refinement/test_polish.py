@@ -14,9 +14,8 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.polishing import intervals_for, polish
-from maneuver_automaton.optimal_control.scene import BodyPart, Polished
+from maneuver_automaton.optimal_control.scene import BodyPart, Point
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.problem import Bounds
@@ -195,24 +194,12 @@ def test_a_change_of_direction_by_millimetres_is_none_that_a_plan_keeps() -> Non
     speeds = np.array([0.0, 0.8, 0.8, 0.0, -0.006, 0.0, 0.01, 0.0, -0.8, 0.0])
     state = np.zeros((len(speeds), 5))
     state[:, 3] = speeds
-    motion = Polished(
-        status=SolveStatus.SOLVED,
-        reason="",
-        state=state,
-        control=np.zeros((len(speeds) - 1, 2)),
-        durations=np.full(len(speeds) - 1, 0.1),
-        objective=1.0,
-        is_feasible=True,
-        lines=0,
-        iterations=1,
-        build_s=0.0,
-        solve_s=0.0,
-    )
+    point = Point(state, np.zeros((len(speeds) - 1, 2)), np.full(len(speeds) - 1, 0.1))
     model = swerve().model
-    gears = without_shuffles(model, motion, 0.01)
+    gears = without_shuffles(model, point, 0.01)
     assert gears is not None
     assert np.count_nonzero(np.diff(gears)) == 1
-    assert without_shuffles(model, motion, 1e-6) is None  # all of its stretches are longer
+    assert without_shuffles(model, point, 1e-6) is None  # all of its stretches are longer
 
 
 @pytest.mark.slow

@@ -204,8 +204,7 @@ def test_several_vehicles_obey_each_for_itself(tmp_path, move):
     assert joint_notes(found) == []
 
 
-def test_notes_are_in_the_terminal_and_in_the_documents(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_notes_are_in_the_terminal_and_in_the_documents(folder, capsys):
     parts = road(SIGN, sign(7, "306"), sign(6, "205"), end=120)
     Path("road.xml").write_text(commonroad(*parts))
     for command, file in (("plan", "plan.json"), ("mpc", "closed_loop.json")):

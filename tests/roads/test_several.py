@@ -37,14 +37,7 @@ PROBLEMS = (
 SLOW = car(7, x=60.0, y=2.0, speed=6.0, steps=60)
 ROAD = commonroad(*LANES, SLOW, *PROBLEMS).replace("TST_Lanes", "ZAM_Lanes")  # an official name
 quiet = pytest.mark.filterwarnings("ignore")  # of the library that writes solutions
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with a road for three."""
-    monkeypatch.chdir(tmp_path)
-    Path("road.xml").write_text(ROAD)
-    return tmp_path
+FILES = {"road.xml": ROAD}
 
 
 @pytest.fixture(scope="module")

@@ -36,9 +36,8 @@ def test_trims_that_there_are_and_that_there_are_not():
     assert asked.pairs() == []
 
 
-def test_from_the_command_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cars.yaml").write_text(CAR)
+def test_from_the_command_line(folder, capsys):
+    (folder / "cars.yaml").write_text(CAR)
     assert run(["automaton", "build", "cars.yaml", "-o", "cars.json", "--jobs", "2"]) == 0
     said = capsys.readouterr()
     assert said.out.startswith("cars.json: 5 trims, 0 maneuvers, hash ")
@@ -61,9 +60,8 @@ maneuvers: {pairs: 1, intervals: 10}
 """
 
 
-def test_maneuvers_by_optimal_control(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "craft.yaml").write_text(CRAFT)
+def test_maneuvers_by_optimal_control(folder, capsys):
+    (folder / "craft.yaml").write_text(CRAFT)
     assert run(["automaton", "build", "craft.yaml", "-o", "craft.json"]) == 0
     counts, solved = capsys.readouterr().out.splitlines()
     library = load_library("craft.json")

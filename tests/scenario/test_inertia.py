@@ -276,9 +276,8 @@ def test_the_json_schema_knows_every_model():
     assert '"strokes_m"' in schema
 
 
-def test_the_command_line_builds_and_shows(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "car.yaml").write_text(text(CAR, "{preset: parking}"))
+def test_the_command_line_builds_and_shows(folder, capsys):
+    (folder / "car.yaml").write_text(text(CAR, "{preset: parking}"))
     assert run(["automaton", "build", "car.yaml", "--out", "car.json"]) == 0
     assert "35 trims, 242 maneuvers" in capsys.readouterr().out
     assert run(["automaton", "show", "car.json"]) == 0

@@ -40,24 +40,19 @@ receding_horizon: {step_s: 0.5}
 """
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with one file of each format."""
-    monkeypatch.chdir(tmp_path)
-    Path("beside.yaml").write_text(BESIDE)
-    Path("Case0.csv").write_text(test_tpcap.CASE)
-    Path("yard.yaml").write_text(test_dynobench.PROBLEM)
-    Path("room.cfg").write_text(test_sbpl_cfg.NAV3D)
-    Path("flat.env").write_text(test_sbpl_cfg.NAV2D)
-    Path("room.map").write_text(test_movingai.MAP)
-    Path("room.map.scen").write_text(test_movingai.SCEN)
-    Path("nav.pgm").write_bytes(b"P5 4 4 255\n" + bytes([254] * 15 + [0]))
-    Path("nav.yaml").write_text(
-        "image: nav.pgm\nresolution: 0.5\norigin: [1, 2, 0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
-    )
-    Path("worlds").mkdir()
-    return tmp_path
+FILES = {  # one file of each format
+    "beside.yaml": BESIDE,
+    "worlds/notes": "",
+    "Case0.csv": test_tpcap.CASE,
+    "yard.yaml": test_dynobench.PROBLEM,
+    "room.cfg": test_sbpl_cfg.NAV3D,
+    "flat.env": test_sbpl_cfg.NAV2D,
+    "room.map": test_movingai.MAP,
+    "room.map.scen": test_movingai.SCEN,
+    "nav.pgm": b"P5 4 4 255\n" + bytes([254] * 15 + [0]),
+    "nav.yaml": "image: nav.pgm\nresolution: 0.5\norigin: [1, 2, 0]\nnegate: 0\n"
+    "occupied_thresh: 0.65\nfree_thresh: 0.25\n",
+}
 
 
 STATED = [

@@ -812,12 +812,9 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
 
 
 @pytest.mark.parametrize("what", MALFORMED)
-def test_one_line_names_file_line_field_value_and_what_would_be_right(
-    what, tmp_path, monkeypatch, capsys
-):
+def test_one_line_names_file_line_field_value_and_what_would_be_right(what, folder, capsys):
     content, message = MALFORMED[what]
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "x.yaml").write_bytes(content if isinstance(content, bytes) else content.encode())
+    (folder / "x.yaml").write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(InvalidScenario) as error:
         load_scenario("x.yaml")
     assert str(error.value) == f"x.yaml{message}"
@@ -825,7 +822,7 @@ def test_one_line_names_file_line_field_value_and_what_would_be_right(
     printed = capsys.readouterr()
     assert printed.err == f"x.yaml{message}\n"
     assert printed.out == ""
-    assert not (tmp_path / "out").exists()
+    assert not (folder / "out").exists()
 
 
 def test_a_file_that_is_not_closed_names_its_line():

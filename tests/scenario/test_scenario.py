@@ -172,8 +172,7 @@ def test_a_library_file_is_found_beside_the_scenario(tmp_path):
     )
 
 
-def test_a_library_of_another_vehicle(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_library_of_another_vehicle(folder):
     save_library(Automaton.of_controls(Car(wheelbase=2.0), {"ahead": (1.0, 0.0)}), "car.json")
     with pytest.raises(InvalidScenario) as error:
         read(automaton("file: car.json"))
@@ -183,8 +182,7 @@ def test_a_library_of_another_vehicle(tmp_path, monkeypatch):
     )
 
 
-def test_a_library_that_was_changed(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_library_that_was_changed(folder):
     robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
     save_library(robot, "robot.json")
     path = Path("robot.json")
