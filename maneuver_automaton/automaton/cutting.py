@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +34,29 @@ def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
         maneuvers[k] = _sampled(piece, due - begin, model)
         k += 1
     return replace(plan, maneuvers=tuple(maneuvers))
+
+
+@lru_cache(maxsize=4096)
+def sampled_finely(one: Maneuver, reaches: tuple[tuple[str, float], ...], off: float) -> Maneuver:
+    """A maneuver of so many samples that no point is farther than `off` [m] from its coasts.
+
+    Points are within reaches [m] of the vehicle's pose, named "", and of the parts it carries.
+    What no equations lead stays as it is.
+    """
+    if one.course is None or (model := one.course.model) is None:
+        return one
+    begins, lasting = one.course.time[:-1], np.diff(one.course.time)
+    middles, farthest = begins + 0.5 * lasting, np.zeros(begins.size)
+    pair: Sequence[Maneuver | None] = (one, _sampled(one, middles, model))
+    for part, reach in reaches:
+        frame = partial(_part_frame, model, part, group_of(one.displacement.size))
+        own = _maneuvers(pair, frame) if part else pair
+        coasts, there = (seen.course.pose_at(middles) for seen in own if seen and seen.course)
+        x, y, turn = np.abs(coasts - there).T[:3]
+        farthest = np.maximum(farthest, np.hypot(x, y) + reach * turn)
+    counts = np.ceil(np.sqrt(farthest / off))  # off a coast it is farthest half way, about
+    dues = [a + t * np.arange(1, n) / n for a, t, n in zip(begins, lasting, counts, strict=True)]
+    return _sampled(one, np.concatenate(dues), model)
 
 
 def head_of(plan: Plan, until: float) -> Plan:
@@ -278,12 +302,8 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
     part : str
         Name of the part.
     """
-    which = model.part_names.index(part)
     group = group_of(plan.start.size)
-
-    def frame(states: Array) -> LieGroup:
-        """Where the part is, seen from the vehicle."""
-        return group(np.asarray(model.part_poses(states)[..., which, :], dtype=np.float64))
+    frame = partial(_part_frame, model, part, group)
 
     if not plan.trims:  # it rests, with all at zero
         behind = group(plan.start) @ frame(np.zeros(len(model.reduced_names)))
@@ -300,6 +320,12 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         ),
         maneuvers=_maneuvers(plan.maneuvers, frame),
     )
+
+
+def _part_frame(model: Model, part: str, group: type[LieGroup], states: Array) -> LieGroup:
+    """Where a part is in states (..., n_z), seen from the vehicle."""
+    poses = np.asarray(model.part_poses(states), dtype=np.float64)
+    return group(poses[..., model.part_names.index(part), :])
 
 
 def _maneuvers(

@@ -43,7 +43,7 @@ class _Lossless:
     def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
         self.held = held
 
-    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
+    def enter(self, step: int, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         self.sent += 2 * self.near(k, found)
         return True
 
@@ -95,8 +95,9 @@ class _Agreement:
         for sender in held:
             self._tell(sender, held[sender], "holds")
 
-    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
+    def enter(self, step: int, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         """Let a vehicle in that holds a plan, if all others say that they know of it."""
+        self.step = step  # it begins with those who enter
         others = [j for j in self.expected if j in held]  # who has left since is not asked
         known = [j for j in others if self._say(k, j, "asks")]
         for j in known:

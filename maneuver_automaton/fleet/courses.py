@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -14,6 +15,8 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._lazy import shapely
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import sampled_finely
+from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.problem import Problem
@@ -21,6 +24,7 @@ from maneuver_automaton.search.lattice_library import altitude_ranges
 
 BANDS = 8  # into which a climb is cut at most, about, to be an obstacle of one height in each
 THIN = 1e-6  # [m] by which what is flat stands out, either way
+OFF = 2e-5  # [m] by which a body may leave the coasts that stand for its maneuvers
 
 
 class HeightBand(NamedTuple):
@@ -133,6 +137,21 @@ def _swings(plan: Plan) -> dict[int, float]:
     return found
 
 
+def followed(plan: Plan, shapes: Mapping[str, tuple[Shape, ...]]) -> Plan:
+    """A plan whose coasts are followed within `OFF` by bodies, each by its part's name, or ""."""
+    if not any(plan.maneuvers):
+        return plan
+    reaches = tuple((part, radius_of(own)) for part, own in shapes.items())
+    finer = tuple(one and sampled_finely(one, reaches, OFF) for one in plan.maneuvers)
+    return replace(plan, maneuvers=finer)
+
+
+def radius_of(shapes: tuple[Shape, ...]) -> float:
+    """How far any point of a body is from its pose [m]."""
+    body = body_of(shapes)
+    return math.hypot(body.middle_x, body.middle_y) + body.reach
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetCourse:
     """A vehicle's bodies in time: each of its parts with a motion, while it is there."""
@@ -232,6 +251,7 @@ def motion_from(motion: Motion, time: float) -> Motion:
     return Motion(times, poses, motion.rates[first - 1 :])
 
 
+@functools.lru_cache(maxsize=1024)
 def larger(shape: Shape, by: float) -> Shape:
     """A shape that holds all within a length [m] of another, with square corners."""
     if by <= 0.0:

@@ -26,7 +26,7 @@ from maneuver_automaton.automaton.cutting import begin_state, carried, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
-from maneuver_automaton.fleet.courses import Levels
+from maneuver_automaton.fleet.courses import OFF, Levels, followed
 from maneuver_automaton.fleet.result import Closest, FleetLog
 from maneuver_automaton.fleet.verdict import CONTACT, NEAR, least_of, plan_of_motion
 from maneuver_automaton.groups import SE2
@@ -67,7 +67,7 @@ class DrivenVerdict:
 def verify_driven(log: FleetLog) -> DrivenVerdict:
     """Check what was driven in a fleet's closed loop, say from a file.
 
-    Distances are lower bounds, at most 0.05 mm below the true ones for pairs. Pairs that keep a
+    Distances are lower bounds, at most 0.1 mm below the true ones for pairs. Pairs that keep a
     metre more than the fleet's margin are left out.
 
     Parameters
@@ -94,12 +94,15 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
     collisions: list[str] = []
     bodies: list[_DrivenBody] = []
     for name, problem, leaves in zip(fleet.names, fleet.problems, fleet.leaves, strict=True):
-        way = whole_pieces(log, name)
+        shapes_of = {"": problem.footprint, **problem.parts}
+        pieces = whole_pieces(log, name).items()
+        way = {step: followed(piece, shapes_of) for step, piece in pieces}
+        off = OFF if any(piece.maneuvers for piece in way.values()) else 0.0
         gone = log.arrived_s.get(name, math.inf) if leaves else math.inf
         for shapes, parts in _parts(problem, way):
             motions = {step: Motion.of_plan(piece) for step, piece in parts.items()}
             bodies += [
-                _DrivenBody(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
+                _DrivenBody(name=name, ring=ring, grown=grown + off, motions=motions, gone=gone)
                 for ring, grown in _rings(shapes)
             ]
         gaps = [np.delete(b.start - a.end, 2) for a, b in pairwise(way.values())]

@@ -25,9 +25,8 @@ from maneuver_automaton.automaton.cutting import (
     with_samples_at,
 )
 from maneuver_automaton.collision.advancement import free_times
-from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.world import own_frame, world_of
-from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.courses import FleetCourse, radius_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan
 from maneuver_automaton.fleet.verdict import nearest_obstacle
@@ -48,8 +47,7 @@ def with_room(problem: Problem, tube_m: float) -> Problem:
     A plan that ends at the edge of a tolerance arrives only where nothing disturbs it; one that
     ends within these arrives from anywhere in its tube [m]. At least half of a tolerance is left.
     """
-    body = body_of(problem.footprint)
-    reach = math.hypot(body.middle_x, body.middle_y) + body.reach
+    reach = radius_of(problem.footprint)
     turn = 2.0 * math.asin(min(1.0, tube_m / (2.0 * reach))) if reach > 0.0 else math.pi
     goals = tuple(
         replace(
@@ -161,8 +159,7 @@ def beside(poses: Array, planned: Array, reach: float) -> Array:
 
 def reach_of(found: OwnPlan, time: float) -> float:
     """How far any point of a vehicle is from its pose at a time of its plan [m]."""
-    bodies = [body_of(shapes) for shapes in found.course.shapes]
-    reaches = [math.hypot(body.middle_x, body.middle_y) + body.reach for body in bodies]
+    reaches = [radius_of(shapes) for shapes in found.course.shapes]
     if len(reaches) == 1:
         return reaches[0]
     places = [motion.at(time)[:2] for motion in found.course.motions]
@@ -349,7 +346,7 @@ def why_not_free(vehicle: FleetMember, course: FleetCourse, keep: float = math.i
     keep = min(problem.margin, keep)
     levels = course.levels if problem.start.size > 3 else None
     frame = own_frame(problem.obstacles, problem.goals[0].pose)
-    for shapes, motion in zip(course.shapes, course.motions, strict=True):
+    for shapes, motion in zip(vehicle.standing.shapes, course.motions, strict=True):
         until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
         enough = max(keep - CONTACT, CONTACT)
         if levels is None:
@@ -386,6 +383,6 @@ def distance_to_obstacles(vehicle: FleetMember, course: FleetCourse) -> float:
             until=max(float(motion.time[-1]), problem.quiet_after),
             levels=levels,
         ).distance
-        for shapes, motion in zip(course.shapes, course.motions, strict=True)
+        for shapes, motion in zip(vehicle.standing.shapes, course.motions, strict=True)
     ]
     return min(found, default=math.inf)

@@ -16,7 +16,7 @@ from maneuver_automaton.collision.body import Body, body_of, fastest_points
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet import _kernels_meetings as kernels
-from maneuver_automaton.fleet.courses import FleetCourse, HeightBand, motion_from
+from maneuver_automaton.fleet.courses import FleetCourse, HeightBand, motion_from, radius_of
 from maneuver_automaton.groups import SE2
 
 PROOF = 1e-4  # [m] more than the distance to keep, wherever two bodies are looked at
@@ -163,8 +163,7 @@ def swept(course: FleetCourse) -> tuple[int, Array, bool]:
     count = max(math.ceil(max(float(way.time[-1]) for way in course.motions) / SLOT) - first, 0) + 1
     boxes = np.tile(np.array(NOWHERE), (count, 1))
     for shapes, way in zip(course.shapes, course.motions, strict=True):
-        body = body_of(shapes)
-        reach = math.hypot(body.middle_x, body.middle_y) + body.reach
+        reach = radius_of(shapes)
         own = _boxes(way, first, count)
         own[:, :2] -= reach
         own[:, 2:] += reach

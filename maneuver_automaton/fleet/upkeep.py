@@ -54,7 +54,7 @@ def let_in(now: Moment) -> None:
                 others.setdefault((j, id(one)), (j, one))
         for found in choices:
             proven = now.is_proven(k, found, list(others.values()))
-            if proven and (at_first or agreement.enter(k, found, now.held)):
+            if proven and (at_first or agreement.enter(now.number, k, found, now.held)):
                 now.held[k] = found
                 effort = now.state.efforts[k]
                 effort.version += 1

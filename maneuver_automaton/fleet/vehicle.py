@@ -19,7 +19,15 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Disc, Obstacle
-from maneuver_automaton.fleet.courses import FleetCourse, levels_of, standing_still, where_it_stays
+from maneuver_automaton.fleet.courses import (
+    OFF,
+    FleetCourse,
+    followed,
+    larger,
+    levels_of,
+    standing_still,
+    where_it_stays,
+)
 from maneuver_automaton.fleet.meetings import PROOF
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left, why_goal_blocked
@@ -206,10 +214,12 @@ class FleetMember:
 
     def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""
-        parts, model = self.problem.parts, self.problem.automaton.model
-        plans = [plan, *(carried(plan, model, name) for name in parts)]
+        bodies = {"": self.problem.footprint or POINT, **self.problem.parts}
+        model, by = self.problem.automaton.model, OFF if any(plan.maneuvers) else 0.0
+        driven = followed(plan, bodies)
+        plans = [carried(driven, model, name) if name else driven for name in bodies]
         return FleetCourse(
-            (self.problem.footprint or POINT, *parts.values()),
+            tuple(tuple(larger(one, by) for one in shapes) for shapes in bodies.values()),
             tuple(Motion.of_plan(one) for one in plans),
             plan.start_time + plan.duration if self.leaves else math.inf,
             self.grown,

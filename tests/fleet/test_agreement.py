@@ -105,14 +105,15 @@ def test_who_enters_is_known_to_all_or_waits():
     for lost, enters in ((), True), ((0,), False), ((2,), False):
         agreement, held, _ = three(*lost)
         agreement.leave(2)
-        assert agreement.enter(2, held[2], {0: held[0], 1: held[1]}) is enters
+        assert agreement.enter(7, 2, held[2], {0: held[0], 1: held[1]}) is enters
         assert (2 in agreement.expected) is enters
 
 
 def test_who_enters_does_not_wait_for_who_has_left_since():
-    agreement, held, _ = three()
+    agreement, held, drops = three()
     agreement.leave(2)
-    assert agreement.enter(2, held[2], {0: held[0]})
+    assert agreement.enter(7, 2, held[2], {0: held[0]})
+    assert {message.step for message in drops.seen} == {7}
     assert [*agreement.others_of(2)] == [0]
 
 

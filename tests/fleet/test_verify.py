@@ -14,6 +14,7 @@ from maneuver_automaton.fleet import FleetProblem, verify_fleet
 from maneuver_automaton.fleet.verdict import NEAR
 from maneuver_automaton.problem import Problem
 from tests.fleet.fleets import car
+from tests.inertia import unicycle_automaton
 
 BODY = (Disc(0.5),)
 SHARPLY = 1e-5  # [m] beside the margin, where it is decided
@@ -87,3 +88,20 @@ def test_who_has_no_plan_stands_at_its_start(standing):
     verdict = verify_fleet(fleet, {name: one for name, one in plans.items() if name != standing})
     assert not verdict.passed  # one has none
     assert verdict.too_near[0].pair == ("there", "back")
+
+
+@pytest.mark.parametrize(("apart", "passes"), [(1e-3, True), (3e-4, False), (-1e-4, False)])
+def test_pairs_are_apart_between_samples_of_maneuvers_too(apart, passes):
+    """One brakes and one speeds up before it: nearest half way, amid a step of both courses."""
+    robot, first = unicycle_automaton(), {"1, 0": 0.0, "rest": 1.25 + apart}  # 0.25 m are lost
+    plans = {}
+    for one in robot.maneuvers:
+        if {one.source, one.target} == {"1, 0", "rest"}:
+            trims = (robot[one.source], robot[one.target])
+            start = [first[one.source], 0.0, 0.0]
+            plans[one.source] = Plan(start, trims, durations=[0.0, 0.0], maneuvers=[one])
+    ends = [(robot, plan.start, plan.end) for plan in plans.values()]
+    problems = [Problem(*each, footprint=BODY) for each in ends]
+    verdict = verify_fleet(FleetProblem(problems, names=list(plans), margin=5e-4), plans)
+    assert (not verdict.too_near) == passes
+    assert apart - 1.2e-4 <= verdict.closest[0].distance_m <= max(apart, 0.0)
