@@ -279,10 +279,8 @@ def surroundings_around(
         If a polygon has no area.
     """
     moving = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is not None]
-    heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
-    for k, height in enumerate([getattr(one, "height", None) for one in obstacles]):
-        if height is not None:
-            heights[k] = height
+    each = [getattr(one, "height", None) or (-math.inf, math.inf) for one in obstacles]
+    heights = np.array(each, dtype=np.float64).reshape(-1, 2)
     number = np.full(len(obstacles), -1)
     number[moving] = np.arange(len(moving))
     whole, owners = _outlined(obstacles, np.where(number[:, None] < 0, origin, 0.0))
@@ -304,8 +302,7 @@ def _moving_edges(
     movers: list[Any], origin: tuple[float, float], whole: Outline, index: IntArray
 ) -> MovingEdges:
     """Those of obstacles in an outline; `index`: which of these each edge is of, -1 of none."""
-    given = [one.motion for one in movers]
-    motions = [Motion(one.time, one.pose - [*origin, 0.0], one.twist) for one in given]
+    motions = [Motion(m.time, m.pose - [*origin, 0.0], m.twist) for m in (o.motion for o in movers)]
     knots, edges = Knots.of(motions), (index >= 0).nonzero()[0]
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == k) for k in range(len(motions)))

@@ -200,21 +200,21 @@ def overlaps(world: WorldArrays, body: Body, place: Place, p: int) -> bool:
 
 @kernel
 def slices_near(
-    starts: Array, twists: Array, durations: Array, speeds: Array, around: Array, boxes: Array
+    starts: Array, twists: Array, durations: Array, around: Array, boxes: Array
 ) -> tuple[IntArray, IntArray, Array, Array, IntArray, NDArray[np.bool_]]:
-    """The fewest slices that cover coasts (n,), those near to one of some boxes (k, 4).
+    """The fewest slices that cover coasts (n,), once around, of them those near to boxes (k, 4).
 
-    Once around is enough, and none is longer than its coast. `speeds` (n,) [m/s]: that no point of
-    the body exceeds. `around` (6,) [m]: middle and half sides of its box, its reach about its
-    frame, and how far from a box nothing is near. Of each slice the number of its coast, its level,
-    when it begins [s], and the pose there; which coasts stand near a box; which boxes (k,) are met.
+    `around` (6,) [m]: middle and half sides of the box of the body, its reach about its frame, and
+    how far from a box nothing is near. Of each slice the number of its coast, its level, when it
+    begins [s], and the pose there; which coasts stand near a box; which boxes (k,) are met.
     """
     n = durations.size
     levels, counts = np.zeros(n, np.int64), np.zeros(n, np.int64)
     lasting, lengths = np.zeros(n), np.zeros(n)
     for k in range(n):
-        if speeds[k] * durations[k] > STANDING:
-            rate = max(abs(twists[k, 2]), LEAST_TURN)
+        rate = max(abs(twists[k, 2]), LEAST_TURN)
+        speed = math.hypot(twists[k, 0], twists[k, 1]) + around[4] * rate  # no point's is greater
+        if speed * durations[k] > STANDING:
             lasting[k] = min(durations[k], 2.0 * math.pi / rate)
             levels[k] = 1 - math.frexp(min(lasting[k], MOST_TURN / rate))[1]
             lengths[k] = math.ldexp(1.0, -int(levels[k]))
@@ -224,17 +224,17 @@ def slices_near(
     poses, still, met = np.empty((most, 3)), np.empty(n, np.int64), np.zeros(len(boxes), np.bool_)
     for k in range(n):
         v_x, v_y, turn_rate, length = twists[k, 0], twists[k, 1], twists[k, 2], lengths[k]
+        place = starts[k, 0], starts[k, 1], starts[k, 2]
         # An arc lies in the triangle of its ends and the point where the tangents there meet.
         turn = abs(turn_rate) * length
         swing = math.hypot(v_x, v_y) * length + around[4] * turn
         off = 0.5 * swing * math.tan(0.5 * turn) + around[5]
-        x, y, heading = starts[k, 0], starts[k, 1], starts[k, 2]
         for i in range(max(counts[k], 1)):
             begin = i * length if i + 1 < counts[k] else lasting[k] - length
             low_x, low_y, high_x, high_y = math.inf, math.inf, -math.inf, -math.inf
             for time in (begin + length, begin):
                 d_x, d_y, turned = coast(v_x, v_y, turn_rate, time)
-                p_x, p_y, there = compose(x, y, heading, d_x, d_y, turned)
+                p_x, p_y, there = compose(*place, d_x, d_y, turned)
                 c, s = math.cos(there), math.sin(there)
                 m_x, m_y = p_x + c * around[0] - s * around[1], p_y + s * around[0] + c * around[1]
                 wide = abs(c) * around[2] + abs(s) * around[3] + off
@@ -248,9 +248,7 @@ def slices_near(
                     met[b] = near = True
             if near and counts[k]:
                 coasts[m], level[m], begins[m] = k, levels[k], begin
-                poses[m, 0], poses[m, 1], poses[m, 2] = p_x, p_y, there
-                m += 1
+                poses[m, 0], poses[m, 1], poses[m, 2], m = p_x, p_y, there, m + 1
             elif near:
-                still[stand] = k
-                stand += 1
+                still[stand], stand = k, stand + 1
     return coasts[:m], level[:m], begins[:m], poses[:m], still[:stand], met

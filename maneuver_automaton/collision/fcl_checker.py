@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
 from maneuver_automaton.collision._kernels_swept import slices_near
-from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
 from maneuver_automaton.collision.shapes import AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
@@ -38,10 +37,10 @@ from maneuver_automaton.collision.swept import (
     swept_hulls,
 )
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # [m] that a box around a slice may be off
+MOST_SORTED = 1000  # obstacles: with more, if all are laid out, to sort out slices takes longer
 Ask: TypeAlias = Callable[[], None]  # called again and again; it may raise
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
@@ -85,7 +84,7 @@ class FclChecker:
 
     def lay_all(self) -> None:
         """Have all obstacles ready, which otherwise are laid out as motions come near them."""
-        self._ground.near(_EVERYWHERE)
+        self._ground.shown(np.ones(len(self._ground.boxes), dtype=np.bool_))
 
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
@@ -132,12 +131,14 @@ class FclChecker:
             return None
         poses = np.stack([seen[rows], seen[rows + 1]])
         steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
-        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
+        reach = self._around[4] + self.proven
         far = np.hypot(steps[:, 0], steps[:, 1])[:, None] + reach
         begins = np.flatnonzero(np.diff(number[rows], prepend=-1))
         low = np.minimum.reduceat(poses[0, :, :2] - far, begins)
         high = np.maximum.reduceat(poses[0, :, :2] + far, begins)
-        laid = self._ground.near(np.concatenate([low, high], axis=1))
+        boxes, low, high = self._ground.boxes, low[:, None], high[:, None]
+        meets = ((boxes[:, :2] <= high) & (boxes[:, 2:] >= low)).all(axis=2)
+        laid = self._ground.shown(np.asarray(meets.any(axis=0)))
         hit = self._first_step_hit(poses, steps, number[rows], laid, ask)
         return None if hit is None else (int(number[rows[hit[0]]]), hit[1])
 
@@ -195,9 +196,10 @@ class FclChecker:
         Slices that are near to nothing are not looked at, nor is what is near to none.
         """
         body, kinds = self._body, [(x, y, turn) for x, y, turn in twists.tolist()]
-        twists, speeds = np.array(twists), np.array([_speed(body, kind) for kind in kinds])
+        if laid is None and len(self._ground.boxes) > MOST_SORTED and self._ground.laid.rows.all():
+            laid = self._ground.laid
         boxes = self._ground.boxes if laid is None else _EVERYWHERE
-        given = starts, twists, np.array(durations), speeds, self._around, boxes
+        given = starts, np.array(twists), np.array(durations), self._around, boxes
         coasts, levels, begins, poses, still, met = slices_near(*given)
         parts, laid = Windows(coasts, levels, begins), laid or self._ground.shown(met)
         if laid.static is None:
@@ -218,12 +220,14 @@ class FclChecker:
             if not sooner:
                 break
             parts = parts.of(np.array(sooner))
-            of, times = parts.coast, parts.begins + 0.5 * parts.lengths
-            hit = self._first_pose_hit(coasted_at(starts, twists, of, times), of, laid)
+            of, times = parts.coast, (parts.begins + 0.5 * parts.lengths)[:, None]
+            poses = (SE2(starts[of]) @ SE2.exp(times * twists[of])).pose
+            hit = self._first_pose_hit(poses, of, laid)
             if hit is not None:
                 first, parts = hit, parts.of(parts.coast < hit[0])
             parts = halves(parts)
-            poses = coasted_at(starts, twists, parts.coast, parts.begins)
+            of, times = parts.coast, parts.begins[:, None]
+            poses = (SE2(starts[of]) @ SE2.exp(times * twists[of])).pose
         return first
 
     def _first_pose_hit(
@@ -260,12 +264,6 @@ class _Ground:
     boxes: Array  # (n, 4) [low x, low y, high x, high y] around them
     excess: float  # [m]
     laid: _Laid
-
-    def near(self, boxes: Array) -> _Laid:
-        """All obstacles that meet one of some boxes (m, 4), and others."""
-        low, high = boxes[:, None, :2], boxes[:, None, 2:]
-        meets = (self.boxes[:, :2] <= high) & (self.boxes[:, 2:] >= low)
-        return self.shown(np.asarray(meets.all(axis=2).any(axis=0)))
 
     def shown(self, met: NDArray[np.bool_]) -> _Laid:
         """All obstacles that are met (n,), and others."""
@@ -330,12 +328,6 @@ def _boxes_around(kinds: ByKind, count: int) -> Array:
 def _standing(body: GrownBody) -> Any:
     """The body at rest."""
     return _object(body_skin(body.pieces))
-
-
-@functools.lru_cache(maxsize=1024)
-def _speed(body: GrownBody, twist: Twist) -> float:
-    """The speed [m/s] that no point of a body exceeds."""
-    return float(point_speeds(np.array([twist]), np.concatenate(body.pieces)).max())
 
 
 @functools.lru_cache(maxsize=1024)
