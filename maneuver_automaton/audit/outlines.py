@@ -89,9 +89,11 @@ def _outlined(solids: tuple[AnyObstacle | Shape, ...], origins: Array) -> tuple[
     kinds = by_kind(solids)
     discs, others = kinds.discs, kinds.others
     if kinds.quads.size:
-        corners = kinds.corners - origins[kinds.quads, None]
-        near = kinds.centers - origins[kinds.boxes]  # centers first, so that no digit is lost
-        corners[: len(near)] = box_corners(near, kinds.headings, kinds.sizes)
+        corners = kinds.corners
+        if origins.any():
+            corners = corners - origins[kinds.quads, None]
+            near = kinds.centers - origins[kinds.boxes]  # centers first, so that no digit is lost
+            corners[: len(near)] = box_corners(near, kinds.headings, kinds.sizes)
         points = points_of(corners)
         both = points.ravel(), points[:, [1, 2, 3, 0]].ravel()
         found.append((kinds.quads.repeat(4), *both, np.zeros(points.size)))
@@ -277,22 +279,34 @@ def surroundings_around(
         If a polygon has no area.
     """
     moving = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is not None]
-    movers: list[Any] = [obstacles[k] for k in moving]
-    given = [one.motion for one in movers]
-    motions = [Motion(one.time, one.pose - [*origin, 0.0], one.twist) for one in given]
-    heights = np.full((len(obstacles), 2), (-math.inf, math.inf))
-    for k, height in enumerate([getattr(one, "height", None) for one in obstacles]):
-        if height is not None:
-            heights[k] = height
+    each = [getattr(one, "height", None) or (-math.inf, math.inf) for one in obstacles]
+    heights = np.array(each, dtype=np.float64).reshape(-1, 2)
     number = np.full(len(obstacles), -1)
     number[moving] = np.arange(len(moving))
     whole, owners = _outlined(obstacles, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights.take(owners, axis=0)
-    still, edges = (index < 0).nonzero()[0], (index >= 0).nonzero()[0]
-    knots = Knots.of(motions) if motions else NO_KNOTS
+    still, movers = (index < 0).nonzero()[0], [obstacles[k] for k in moving]
+    return Surroundings(
+        outline=whole,
+        owners=owners,
+        heights=heights_of,
+        motion_of_edge=index,
+        movers=_moving_edges(movers, origin, whole, index) if movers else NO_MOVERS,
+        still=still,
+        index=_boxed(whole, still, heights_of),
+        rounds=bool(whole.radius.any()),
+    )
+
+
+def _moving_edges(
+    movers: list[Any], origin: tuple[float, float], whole: Outline, index: IntArray
+) -> MovingEdges:
+    """Those of obstacles in an outline; `index`: which of these each edge is of, -1 of none."""
+    motions = [Motion(m.time, m.pose - [*origin, 0.0], m.twist) for m in (o.motion for o in movers)]
+    knots, edges = Knots.of(motions), (index >= 0).nonzero()[0]
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == k) for k in range(len(motions)))
-    moved = MovingEdges(
+    return MovingEdges(
         motions=tuple(motions),
         knots=knots,
         present=np.array([one.presence for one in movers], dtype=np.float64).reshape(-1, 2),
@@ -304,19 +318,9 @@ def surroundings_around(
         groups=groups,
         reaches=np.array([float((np.abs(one.begins) + one.radius).max()) for one in groups]),
     )
-    return Surroundings(
-        outline=whole,
-        owners=owners,
-        heights=heights_of,
-        motion_of_edge=index,
-        movers=moved,
-        still=still,
-        index=_boxed(whole, still, heights_of),
-        rounds=bool(whole.radius.any()),
-    )
 
 
-NO_KNOTS = Knots.of(())
+NO_MOVERS = _moving_edges([], (0.0, 0.0), *_outlined((), np.zeros((0, 2))))
 surroundings_of = functools.lru_cache(maxsize=8)(surroundings_around)  # those of the last maps
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
@@ -20,9 +21,13 @@ from maneuver_automaton.collision._kernels_clearance import (
 )
 from maneuver_automaton.collision.arrays import Place, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
+from maneuver_automaton.groups._kernels import coast, compose
 
 WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
 SHORT = 1e-9  # [m] of an edge without a normal
+MOST_TURN = 0.25  # [rad] of one slice
+LEAST_TURN = 1e-300  # [rad/s] so that times of turns are numbers
+STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
 FREE, UNKNOWN = -1, -2  # in place of the solid that is not parted from a motion
 
 
@@ -191,3 +196,59 @@ def overlaps(world: WorldArrays, body: Body, place: Place, p: int) -> bool:
             if apart <= 0.0:
                 return True
     return False
+
+
+@kernel
+def slices_near(
+    starts: Array, twists: Array, durations: Array, around: Array, boxes: Array
+) -> tuple[IntArray, IntArray, Array, Array, IntArray, NDArray[np.bool_]]:
+    """The fewest slices that cover coasts (n,), once around, of them those near to boxes (k, 4).
+
+    `around` (6,) [m]: middle and half sides of the box of the body, its reach about its frame, and
+    how far from a box nothing is near. Of each slice the number of its coast, its level, when it
+    begins [s], and the pose there; which coasts stand near a box; which boxes (k,) are met.
+    """
+    n = durations.size
+    levels, counts = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    lasting, lengths = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        rate = max(abs(twists[k, 2]), LEAST_TURN)
+        speed = math.hypot(twists[k, 0], twists[k, 1]) + around[4] * rate  # no point's is greater
+        if speed * durations[k] > STANDING:
+            lasting[k] = min(durations[k], 2.0 * math.pi / rate)
+            levels[k] = 1 - math.frexp(min(lasting[k], MOST_TURN / rate))[1]
+            lengths[k] = math.ldexp(1.0, -int(levels[k]))
+            counts[k] = math.ceil(lasting[k] / lengths[k])
+    most, m, stand = counts.sum(), 0, 0
+    coasts, level, begins = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    poses, still, met = np.empty((most, 3)), np.empty(n, np.int64), np.zeros(len(boxes), np.bool_)
+    for k in range(n):
+        v_x, v_y, turn_rate, length = twists[k, 0], twists[k, 1], twists[k, 2], lengths[k]
+        place = starts[k, 0], starts[k, 1], starts[k, 2]
+        # An arc lies in the triangle of its ends and the point where the tangents there meet.
+        turn = abs(turn_rate) * length
+        swing = math.hypot(v_x, v_y) * length + around[4] * turn
+        off = 0.5 * swing * math.tan(0.5 * turn) + around[5]
+        for i in range(max(counts[k], 1)):
+            begin = i * length if i + 1 < counts[k] else lasting[k] - length
+            low_x, low_y, high_x, high_y = math.inf, math.inf, -math.inf, -math.inf
+            for time in (begin + length, begin):
+                d_x, d_y, turned = coast(v_x, v_y, turn_rate, time)
+                p_x, p_y, there = compose(*place, d_x, d_y, turned)
+                c, s = math.cos(there), math.sin(there)
+                m_x, m_y = p_x + c * around[0] - s * around[1], p_y + s * around[0] + c * around[1]
+                wide = abs(c) * around[2] + abs(s) * around[3] + off
+                high = abs(s) * around[2] + abs(c) * around[3] + off
+                low_x, high_x = min(low_x, m_x - wide), max(high_x, m_x + wide)
+                low_y, high_y = min(low_y, m_y - high), max(high_y, m_y + high)
+            near = False
+            for b in range(len(boxes)):
+                aside = boxes[b, 0] > high_x or boxes[b, 2] < low_x
+                if not (aside or boxes[b, 1] > high_y or boxes[b, 3] < low_y):
+                    met[b] = near = True
+            if near and counts[k]:
+                coasts[m], level[m], begins[m] = k, levels[k], begin
+                poses[m, 0], poses[m, 1], poses[m, 2], m = p_x, p_y, there, m + 1
+            elif near:
+                still[stand], stand = k, stand + 1
+    return coasts[:m], level[:m], begins[:m], poses[:m], still[:stand], met

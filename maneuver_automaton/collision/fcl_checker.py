@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, check_range
-from maneuver_automaton.collision.motion import point_speeds
+from maneuver_automaton.collision._kernels_swept import slices_near
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import SIDES, AnyObstacle, ByKind, Shape, by_kind
+from maneuver_automaton.collision.shapes import AnyObstacle, ByKind, Shape, by_kind
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_skin
 from maneuver_automaton.collision.swept import (
-    STANDING,
     GrownBody,
     Twist,
     Windows,
@@ -36,13 +35,12 @@ from maneuver_automaton.collision.swept import (
     halves,
     slice_excess,
     swept_hulls,
-    windows,
 )
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.groups._kernels import coasted_at
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # [m] that a box around a slice may be off
+MOST_SORTED = 1000  # obstacles: with more, if all are laid out, to sort out slices takes longer
 Ask: TypeAlias = Callable[[], None]  # called again and again; it may raise
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
@@ -67,6 +65,7 @@ class FclChecker:
     origin: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m]
     proven: float = field(default=1e-3, kw_only=True)  # [m]
     _body: GrownBody = field(init=False, repr=False)
+    _around: Array = field(init=False, repr=False)  # (6,) of `slices_near`
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -77,12 +76,15 @@ class FclChecker:
         object.__setattr__(self, "footprint", tuple(self.footprint))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "origin", (x, y))
-        object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
+        body = grown_body(self.footprint, self.margin, excess)
+        object.__setattr__(self, "_body", body)
+        own = *body.middle, *body.half, float(np.hypot(*body.middle)) + body.reach
+        object.__setattr__(self, "_around", np.array([*own, self.proven + ROUNDED]))
         object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
 
     def lay_all(self) -> None:
         """Have all obstacles ready, which otherwise are laid out as motions come near them."""
-        self._ground.near(np.array([[-math.inf, -math.inf, math.inf, math.inf]]))
+        self._ground.shown(np.ones(len(self._ground.boxes), dtype=np.bool_))
 
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
@@ -129,12 +131,14 @@ class FclChecker:
             return None
         poses = np.stack([seen[rows], seen[rows + 1]])
         steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
-        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
+        reach = self._around[4] + self.proven
         far = np.hypot(steps[:, 0], steps[:, 1])[:, None] + reach
         begins = np.flatnonzero(np.diff(number[rows], prepend=-1))
         low = np.minimum.reduceat(poses[0, :, :2] - far, begins)
         high = np.maximum.reduceat(poses[0, :, :2] + far, begins)
-        laid, _ = self._ground.near(np.concatenate([low, high], axis=1))
+        boxes, low, high = self._ground.boxes, low[:, None], high[:, None]
+        meets = ((boxes[:, :2] <= high) & (boxes[:, 2:] >= low)).all(axis=2)
+        laid = self._ground.shown(np.asarray(meets.any(axis=0)))
         hit = self._first_step_hit(poses, steps, number[rows], laid, ask)
         return None if hit is None else (int(number[rows[hit[0]]]), hit[1])
 
@@ -144,23 +148,6 @@ class FclChecker:
         if any(self.origin):
             near[..., :2] -= self.origin
         return near
-
-    def _boxes_around(self, starts: Array, twists: Array, parts: Windows, still: IntArray) -> Array:
-        """Boxes (n, 4) that hold the body along slices of coasts, and at places where it stands."""
-        none, body = np.zeros(still.size), self._body
-        of, lasts = np.append(parts.coast, still), np.append(parts.lengths, none)
-        begins = np.append(parts.begins, none)
-        ends = coasted_at(starts, twists, np.append(of, of), np.append(begins, begins + lasts))
-        own = (SIDES.T * 2.0 * body.half + body.middle) @ np.array([1.0, 1j])
-        x, y, heading = ends.reshape(2, -1, 3).T
-        seen = (x + 1j * y)[..., None] + np.exp(1j * heading)[..., None] * own
-        # An arc lies in the triangle of its ends and the point where the tangents there meet.
-        turns, speeds = np.abs(twists[of, 2]) * lasts, np.hypot(twists[of, 0], twists[of, 1])
-        swing = speeds * lasts + (float(np.hypot(*body.middle)) + body.reach) * turns
-        off = 0.5 * swing * np.tan(0.5 * turns) + self.proven + ROUNDED
-        low = seen.real.min(axis=(1, 2)) - off, seen.imag.min(axis=(1, 2)) - off
-        high = seen.real.max(axis=(1, 2)) + off, seen.imag.max(axis=(1, 2)) + off
-        return np.stack([*low, *high], axis=1)
 
     def _first_step_hit(
         self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Ask
@@ -206,20 +193,15 @@ class FclChecker:
     ) -> tuple[int, int] | None:
         """The first of some coasts that touches a static obstacle, and which.
 
-        Without obstacles that are `laid` out, slices that are near to none are not looked at.
+        Slices that are near to nothing are not looked at, nor is what is near to none.
         """
         body, kinds = self._body, [(x, y, turn) for x, y, turn in twists.tolist()]
-        coasts = [
-            (kind, time if _speed(body, kind) * time > STANDING else 0.0)
-            for kind, time in zip(kinds, durations.tolist(), strict=True)
-        ]
-        still = np.array([k for k, (_, time) in enumerate(coasts) if not time], dtype=np.int64)
-        parts, twists = windows(coasts), np.array(twists)
-        if laid is None and self._ground.laid.is_whole:  # to ask takes no longer than to sort out
+        if laid is None and len(self._ground.boxes) > MOST_SORTED and self._ground.laid.rows.all():
             laid = self._ground.laid
-        elif laid is None:
-            laid, near = self._ground.near(self._boxes_around(starts, twists, parts, still))
-            parts, still = parts.of(near[: parts.coast.size]), still[near[parts.coast.size :]]
+        boxes = self._ground.boxes if laid is None else _EVERYWHERE
+        given = starts, np.array(twists), np.array(durations), self._around, boxes
+        coasts, levels, begins, poses, still, met = slices_near(*given)
+        parts, laid = Windows(coasts, levels, begins), laid or self._ground.shown(met)
         if laid.static is None:
             return None
         first = self._first_pose_hit(starts[still], still, laid)
@@ -230,8 +212,7 @@ class FclChecker:
             of = parts.coast
             slices = zip(of.tolist(), parts.level.tolist(), strict=True)
             solids = [_sliced(body, kinds[k], level) for k, level in slices]
-            poses = coasted_at(starts, twists, of, parts.begins)
-            hits = _touching([solid for solid, _ in solids], poses, laid.static)
+            hits = _touching([solid for solid, _ in solids], poses[: of.size], laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
                 if solids[row][1] <= 0.5 * self.proven and (not first or of[row] < first[0]):
                     first = int(of[row]), int(laid.owners[triangle])
@@ -239,11 +220,14 @@ class FclChecker:
             if not sooner:
                 break
             parts = parts.of(np.array(sooner))
-            of, times = parts.coast, parts.begins + 0.5 * parts.lengths
-            hit = self._first_pose_hit(coasted_at(starts, twists, of, times), of, laid)
+            of, times = parts.coast, (parts.begins + 0.5 * parts.lengths)[:, None]
+            poses = (SE2(starts[of]) @ SE2.exp(times * twists[of])).pose
+            hit = self._first_pose_hit(poses, of, laid)
             if hit is not None:
                 first, parts = hit, parts.of(parts.coast < hit[0])
             parts = halves(parts)
+            of, times = parts.coast, parts.begins[:, None]
+            poses = (SE2(starts[of]) @ SE2.exp(times * twists[of])).pose
         return first
 
     def _first_pose_hit(
@@ -269,7 +253,6 @@ class _Laid(NamedTuple):
     rows: NDArray[np.bool_]  # (n,) which of all
     static: Any  # one object for all of them, None without
     owners: IntArray  # which obstacle each of its triangles belongs to
-    is_whole: bool  # no obstacle is left out
 
 
 @dataclass(slots=True, eq=False)
@@ -282,29 +265,25 @@ class _Ground:
     excess: float  # [m]
     laid: _Laid
 
-    def near(self, boxes: Array) -> tuple[_Laid, NDArray[np.bool_]]:
-        """All obstacles that meet one of some boxes (m, 4), and others; which boxes meet any."""
-        laid, far = self.laid, math.inf
-        low, high = boxes[:, :2].min(axis=0, initial=far), boxes[:, 2:].max(axis=0, initial=-far)
-        around = (self.boxes[:, :2] <= high) & (self.boxes[:, 2:] >= low)
-        some = around.all(axis=1).nonzero()[0]
-        low_x, low_y, high_x, high_y = self.boxes[some].T[:, :, None]
-        meets = (low_x <= boxes[:, 2]) & (low_y <= boxes[:, 3])
-        meets &= (high_x >= boxes[:, 0]) & (high_y >= boxes[:, 1])
-        asked = meets.any(axis=0)
-        missing = some[meets.any(axis=1) & ~laid.rows[some]]
-        if not missing.size:
-            return laid, asked
-        # Who comes back is likely to come again: then all that is around is laid out.
-        rows = laid.rows.copy()
-        rows[missing if laid.static is None else some] = True
+    def shown(self, met: NDArray[np.bool_]) -> _Laid:
+        """All obstacles that are met (n,), and others."""
+        laid = self.laid
+        missing = met & ~laid.rows
+        if not missing.any():
+            return laid
+        rows = laid.rows | missing
+        if laid.static is not None:  # who comes back is likely to come again: all between as well
+            some = self.boxes[met]
+            low, high = some[:, :2].min(axis=0), some[:, 2:].max(axis=0)
+            rows |= ((self.boxes[:, :2] <= high) & (self.boxes[:, 2:] >= low)).all(axis=1)
         skin, of = obstacle_skin(self.kinds, rows, excess=self.excess)
         static = _object(skin) if of.size else None
         # Other threads may lay out others meanwhile: this call goes on with its own.
-        self.laid = laid = _Laid(rows, static, self.numbers[of], bool(rows.all()))
-        return laid, asked
+        self.laid = laid = _Laid(rows, static, self.numbers[of])
+        return laid
 
 
+_EVERYWHERE = np.array([[-math.inf, -math.inf, math.inf, math.inf]])  # a box
 _LEVELS = np.repeat([0.0, 1.0], 4)  # of the corners of a box
 _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 
@@ -322,7 +301,7 @@ def _ground_of(
         numbers=np.array(static, dtype=np.int64),
         boxes=_boxes_around(kinds, len(seen)),
         excess=excess,
-        laid=_Laid(np.zeros(len(seen), np.bool_), None, np.zeros(0, np.int64), not seen),
+        laid=_Laid(np.zeros(len(seen), np.bool_), None, np.zeros(0, np.int64)),
     )
 
 
@@ -349,12 +328,6 @@ def _boxes_around(kinds: ByKind, count: int) -> Array:
 def _standing(body: GrownBody) -> Any:
     """The body at rest."""
     return _object(body_skin(body.pieces))
-
-
-@functools.lru_cache(maxsize=1024)
-def _speed(body: GrownBody, twist: Twist) -> float:
-    """The speed [m/s] that no point of a body exceeds."""
-    return float(point_speeds(np.array([twist]), np.concatenate(body.pieces)).max())
 
 
 @functools.lru_cache(maxsize=1024)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -20,16 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision._kernels_swept import MOST_TURN
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.solids import body_pieces, convex_hull
 from maneuver_automaton.groups import SE2
 
 Twist = tuple[float, float, float]  # [m/s, m/s, rad/s]
-MOST_TURN = 0.25  # [rad] of one slice
-LEAST_TURN = 1e-300  # [rad/s] so that times of turns are numbers
 MOST_STEPS = 32  # of a course in one hull
-STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
 FAR = 1e9  # [m] what turns about a point further away is taken to go straight
 ROUND = 0.1  # of a piece's extent: sides of less than this on either side of a pivot stay whole
 
@@ -129,8 +126,9 @@ def swept_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
     tangents there meet; points between corners are between such triangles.
     """
     v_x, v_y, turn = (column[:, None] for column in steps.T)
-    half = np.where(turn == 0.0, 1.0, 0.5 * turn)
-    to_tangents = np.where(turn == 0.0, 0.5, 0.5 * np.tan(half) / half)
+    straight = 0.5 * turn == 0.0
+    half = np.where(straight, 1.0, 0.5 * turn)
+    to_tangents = np.where(straight, 0.5, 0.5 * np.tan(half) / half)
     hulls = []
     for corners in body.pieces:
         x, y = corners.T
@@ -213,25 +211,6 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
         arcs = radius * (0.125 * turn**2 + 2.0 * math.sin(0.25 * turn) ** 2 / math.cos(0.5 * turn))
         excess = max(excess, 0.5 * reach * turn + arcs)
     return excess
-
-
-def windows(coasts: Iterable[tuple[Twist, float]]) -> Windows:
-    """The fewest slices that cover coasts, a twist and a duration [s] each, none longer than it.
-
-    Once around is enough.
-    """
-    coast, levels, begins = list[int](), list[int](), list[float]()
-    for k, ((_, _, turn), lasts) in enumerate(coasts):
-        rate = max(abs(turn), LEAST_TURN)
-        lasts = min(lasts, math.tau / rate)
-        level = 1 - math.frexp(min(lasts, MOST_TURN / rate))[1]
-        length = math.ldexp(1.0, -level)
-        count = math.ceil(lasts / length)
-        coast += [k] * count
-        levels += [level] * count
-        begins += [n * length for n in range(count - 1)] + [lasts - length] * (count > 0)
-    numbers = np.array([coast, levels], dtype=np.int64)
-    return Windows(numbers[0], numbers[1], np.array(begins, dtype=np.float64))
 
 
 def halves(parts: Windows) -> Windows:

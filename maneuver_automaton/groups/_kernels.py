@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton._compile import inner_kernel
 
 
 @inner_kernel
@@ -49,14 +46,3 @@ def back_from(
 def nearest_turn(angle: float) -> float:
     """Angle modulo a full turn, in [-pi, pi]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
-
-
-@kernel
-def coasted_at(starts: Array, twists: Array, which: IntArray, times: Array) -> Array:
-    """Poses (m, 3) on coasts by number (m,), which have `starts` and `twists` (n, 3), at times."""
-    poses = np.empty((which.size, 3))
-    for k in range(which.size):
-        start, twist = starts[which[k]], twists[which[k]]
-        d_x, d_y, turn = coast(twist[0], twist[1], twist[2], times[k])
-        poses[k] = compose(start[0], start[1], start[2], d_x, d_y, turn)
-    return poses

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Disc
+from maneuver_automaton.collision._kernels_swept import slices_near
 from maneuver_automaton.collision.swept import (
     course_boxes,
     cut_where_it_pivots,
     grown_body,
     slice_excess,
     swept_hulls,
-    windows,
 )
 from maneuver_automaton.groups import SE2
 from tests.collision.scenes import ANGLE, FOOTPRINTS, TWISTS
@@ -35,7 +35,8 @@ twists = st.tuples(speeds, speeds, speeds)
 @pytest.mark.parametrize("name", ["car", "angle", "truck", "point"])
 def test_every_point_at_every_time_is_inside(name, twist, part):
     body = grown_body(FOOTPRINTS[name], 0.0, 1e-3)
-    duration = part * _windows(twist, 2.0).lengths[0]
+    level = _slices(twist, 2.0)[1]
+    duration = part * (0.5 ** float(level[0]) if level.size else 2.0)
     body = cut_where_it_pivots(body, twist)
     poses = SE2.exp(np.multiply.outer(np.linspace(0.0, duration, 9), twist))
     for corners, hull in zip(body.pieces, slice_hulls(body, twist, duration), strict=True):
@@ -69,8 +70,37 @@ def _ring(hull):
     return shapely.LinearRing(hull)
 
 
-def _windows(twist, duration):
-    return windows([(twist, duration)])
+def _slices(
+    twist, duration, around=(0, 0, 0, 0, 1.0, 0), boxes=((-np.inf, -np.inf, np.inf, np.inf),)
+):
+    """The slices of one coast."""
+    given = np.zeros((1, 3)), np.array([twist]), np.array([duration])
+    return slices_near(*given, np.array(around), np.array(boxes))
+
+
+@given(twist=twists, place=st.tuples(*[st.floats(-4.0, 4.0)] * 2))
+@pytest.mark.parametrize("name", ["car", "angle", "truck", "point"])
+def test_slices_cover_a_coast_and_those_left_out_meet_no_box(name, twist, place):
+    assume(max(map(abs, twist)) > 1e-9)  # it does not stand
+    body = grown_body(FOOTPRINTS[name], 0.0, 1e-3)
+    box = np.append(place, np.add(place, 0.5))
+    around = [*body.middle, *body.half, np.hypot(*body.middle) + body.reach, 1e-7]
+    _, level, begins, poses, *_ = _slices(twist, 3.0)
+    _, _, near, _, stands, met = _slices(twist, 3.0, around, [box])
+    assert met[0] == bool(near.size or stands.size)
+    lengths = np.ldexp(1.0, -level)
+    assert begins[0] == 0.0
+    assert (begins[1:] <= (begins + lengths)[:-1]).all()
+    assert begins[-1] + lengths[-1] == pytest.approx(min(3.0, 2.0 * np.pi / max(abs(twist[2]), 1)))
+    for begin, length, pose in zip(begins, lengths, poses, strict=True):
+        times = begin + np.linspace(0.0, length, 5)
+        along = SE2.exp(np.multiply.outer(times, twist))
+        assert pose == pytest.approx(along.pose[0], abs=1e-12)
+        if begin not in near and not stands.size:
+            for corners in body.pieces:
+                seen = SE2(along.pose[:, None]).act(corners)
+                hulls = shapely.convex_hull(shapely.multipoints(seen))
+                assert not shapely.intersects(hulls, shapely.box(*box)).any()
 
 
 courses = st.lists(

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.groups._kernels import coasted_at
+from maneuver_automaton.groups import group_of
 from maneuver_automaton.groups.se2 import chained, coasted, end_of_coasting, seen_from
 
 RATES = st.sampled_from([0.0, 1.0]) | st.floats(-3.0, 3.0) | st.floats(-1e-7, 1e-7)
@@ -44,11 +43,3 @@ def test_a_pose_is_seen_from_another_as_the_group_has_it(dof, data):
     expected = (group(start).inverse() @ group(pose)).pose
     size = 1.0 + np.abs(start).max() + np.abs(pose).max()
     np.testing.assert_allclose(seen_from(start, pose), expected, rtol=0.0, atol=1e-13 * size)
-
-
-def test_poses_on_coasts_by_number():
-    starts, twists, times = np.random.default_rng(0).normal(size=(3, 4, 3))
-    twists[0, 2], which = 0.0, np.array([0, 0, 3, 1, 2])
-    at = np.ascontiguousarray(times[:, 0][which])
-    expected = SE2(starts[which]) @ SE2.exp(at[:, None] * twists[which])
-    assert coasted_at(starts, twists, which, at) == pytest.approx(expected.pose, abs=1e-12)
