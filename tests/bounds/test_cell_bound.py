@@ -8,7 +8,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.bounds import cell_proofs, pose_scene
-from maneuver_automaton.bounds.cells import finer, first_cells, on_finer
+from maneuver_automaton.bounds.cells import PoseCells, finer, first_cells, on_finer
 from maneuver_automaton.bounds.families import motions_of
 from maneuver_automaton.bounds.levels import _goal_cells, _in_the_plane, _nodes_of
 from maneuver_automaton.bounds.program import program_of, slope
@@ -129,6 +129,15 @@ def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
     assert 0.8 * cost < cut.value <= cost
     assert cut.kind == "cells"
     assert [value for _, value in cut.history] == sorted(value for _, value in cut.history)
+
+
+def test_a_goal_has_cells_at_both_ends_of_a_circle_that_is_opened():
+    """Those of one end were left out: 1.89 m were proven of a straight way of 0.8 m."""
+    active = np.ones((1, 1, 7), dtype=np.uint8)
+    sizes = {"size": 1.0, "headings": 8, "low": np.array([0, 0, 2])}
+    cells = PoseCells(active=active, round_trip=False, **sizes)
+    at = cells.coordinates(np.array([0.5, 0.5, 0.4]))
+    assert [k for *_, k in cells.around(at, (0.0, 2.5))] == [0, 1, 4, 5, 6]
 
 
 def test_no_motions_are_known_where_to_sink_costs_less_than_to_rest():
