@@ -214,11 +214,11 @@ class PoseCells:
         for axis, beside in enumerate((reach[0], reach[0], reach[1])):
             low = math.floor(at[axis] - beside - ON_EDGE)
             high = math.floor(at[axis] + beside + ON_EDGE)
-            count = self.active.shape[axis]
-            if axis == 2 and self.round_trip:
-                ranges.append(sorted({k % count for k in range(low, min(high, low + count) + 1)}))
-            else:
-                ranges.append([k for k in range(low, high + 1) if 0 <= k < count])
+            within = list(range(low, high + 1))
+            if axis == 2:  # in an opened circle, too, both ends may be near
+                turns = range(low, min(high, low + self.headings) + 1)
+                within = sorted({k % self.headings for k in turns})
+            ranges.append([k for k in within if 0 <= k < self.active.shape[axis]])
         return [(i, j, k) for i in ranges[0] for j in ranges[1] for k in ranges[2]]
 
     def corners(self, at: Array) -> tuple[list[Index], Array]:

@@ -73,7 +73,8 @@ def motions_of(problem: Problem) -> Motions | None:
     else:
         return None
     moving = twists.any(axis=1)
-    if not moving.any() or (rates[moving] <= 0.0).any() or not twists[:, :2].any():
+    free = (rates < 0.0).any() or (rates[moving] <= 0.0).any()  # also to climb instead of resting
+    if free or not twists[:, :2].any():
         return None
     families = _families(twists[moving] / rates[moving, None], gears=price > 0.0)
     return Motions(families=families, price=price, besides=besides(problem))

@@ -72,12 +72,14 @@ def greatest_speed(model: Model, *, axes: tuple[int, ...] = (0, 1, 3)) -> float:
     Source: Moore, Kearfott, Cloud (2009), *Introduction to Interval Analysis*, Ch. 5: the value of
     an expression on intervals contains all its values.
     """
-    model = as_stated(model)  # it is as fast seen from the world as from its body
+    seen, model = model, as_stated(model)  # as fast seen from the world as from its body
+    up = 3 if seen is model else 2  # translations have no heading
     state = [Interval(low, high) for low, high in model.reduced_limits.tolist()]
     control = [Interval(low, high) for low, high in model.control_limits.tolist()]
     try:
         velocity = model.velocity(state, control)
-        sides = [_interval(velocity[k]).size for k in range(len(velocity)) if k in axes]
+        numbered = [(3 if k == up else k, one) for k, one in enumerate(velocity)]
+        sides = [_interval(one).size for k, one in numbered if k in axes]
     except (TypeError, AttributeError, ZeroDivisionError):
         return math.inf
     fastest = math.hypot(*sides)

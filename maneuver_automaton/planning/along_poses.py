@@ -44,6 +44,7 @@ from maneuver_automaton.planning.on_the_way import goal_around
 from maneuver_automaton.planning.polishing import polish_on_the_way
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, Via
+from maneuver_automaton.words.library import moving_trims
 
 LEAST_WORK = 3  # expansions that a leg counts for at least: one by words takes none
 LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
@@ -121,11 +122,6 @@ class Way:
 
     via: Via
     arrivals: tuple[Arrival, ...]
-
-    @property
-    def is_sole(self) -> bool:
-        """Whether there is one way to pass it, and no other."""
-        return len(self.arrivals) == 1 and not self.is_free
 
     @property
     def is_free(self) -> bool:
@@ -268,8 +264,7 @@ class _Search:
             if k == n:
                 priced = priced.min(axis=1, keepdims=True)
             self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
-            sole = all(self.ways[way].is_sole for way in (i, k) if way < n)
-            if sole and self.estimated.are_least:
+            if self.estimated.are_least and self._are_sole(i, k):
                 self.bounds[i, k] = self.costs[np.ix_(rows[i], rows[k])].item()
 
     def _pairs(self) -> Iterator[tuple[int, int]]:
@@ -278,6 +273,15 @@ class _Search:
         for i, k in itertools.product(range(n + 1), repeat=2):
             if (k == (i + 1) % (n + 1)) if self.in_order else (i != k or n == 0):
                 yield i, k
+
+    def _are_sole(self, *ways: int) -> bool:
+        """Whether each of these is passed in one way and no other, within a maneuver neither."""
+        passed = [self.ways[k] for k in ways if k not in (GOAL, len(self.ways))]
+        inertia = self.legs.between.has_inertia
+        return all(
+            len(way.arrivals) == 1 and not way.is_free and (way.via.stop or not inertia)
+            for way in passed
+        )
 
     @property
     def is_free(self) -> bool:
@@ -372,8 +376,7 @@ class _Search:
     def _stays(self) -> Array:
         """Cost (n,) of standing at each pose on the way."""
         problem = self.found.problem
-        rest = problem.automaton.rest
-        rate = 0.0 if rest is None else float(problem.rates[rest])
+        rate = moving_trims(problem.automaton, problem.cost).rest_rate
         return np.array([rate * way.via.stay_s for way in self.ways])
 
     def _extended(self, chain: Chain, k: int, to: Arrival | None, budget: Budget) -> Chain | None:
@@ -396,8 +399,8 @@ class _Search:
         column = every if to is None else self.numbers.get((k, to.key))
         if row is not None and column is not None:
             self.costs[row, column] = math.inf if result.cost is None else result.cost
-        sole = all(self.ways[i].is_sole for i in (last, k) if i not in (GOAL, n))
-        if sole and result.lower_bound is not None and not self.legs.is_timed:
+        known = result.lower_bound is not None and not self.legs.is_timed
+        if known and self._are_sole(last, k):
             at = last, n if to is None else k
             self.bounds[at] = max(self.bounds[at], result.lower_bound)
 
@@ -414,9 +417,11 @@ class _Search:
 
     def _standing(self, plan: Plan, seconds: float) -> Plan:
         """A plan that stands where another one ends."""
-        automaton = self.found.problem.automaton
+        problem, automaton = self.found.problem, self.found.problem.automaton
+        cheapest = moving_trims(automaton, problem.cost).rest
+        at = automaton.rest if problem.has_inertia else cheapest
         rests = plan.trims and plan.trims[-1].is_rest
-        rest = plan.trims[-1] if rests else automaton.trims[automaton.rest or 0]
+        rest = plan.trims[-1] if rests else automaton.trims[at or 0]
         return Plan(plan.end, (rest,), durations=[seconds])
 
     def _offer(self, chain: Chain) -> bool:
@@ -575,7 +580,7 @@ class _Search:
         (last, k), result = max(self.failed.items(), key=lambda one: one[0][0])
         begin = "the start" if last == GOAL else f"pose {last + 1} on the way"
         end = "the goal" if k == GOAL else f"pose {k + 1} on the way"
-        sole = all(self.ways[i].is_sole for i in (last, k) if i != GOAL) and self.in_order
+        sole = self._are_sole(last, k) and self.in_order
         sole &= last == GOAL or not self.legs.is_timed  # what was driven before may be another
         status = result.status if sole else PlanStatus.NO_PLAN
         if any(one.status is PlanStatus.OUT_OF_BUDGET for one in self.failed.values()):

@@ -95,7 +95,8 @@ def arrivals_of(
         found = [Arrival(pose, trim) for pose in poses for trim in _trims(problem, via)]
     blocked = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
     if all(blocked):
-        proven = len(found) == 1 and not via.radius
+        bare = replace(problem, parts={})  # they may be elsewhere within a maneuver
+        proven = not via.radius and why_goal_blocked(bare, around)
         return (), (PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN, _about(blocked[0]))
     return tuple(one for one, why in zip(found, blocked, strict=True) if not why), None
 
@@ -273,7 +274,9 @@ def set_bound(problem: Problem, way: Goal | None, goal: Goal) -> float:
 
 def _least(problem: Problem, goal: Goal) -> float:
     """No plan to a goal costs less, whatever its trims: by distance and turn alone."""
-    return straight_bound(problem, (goal,)) if problem.has_inertia else closed_bound(problem, goal)
+    if problem.has_inertia:
+        return straight_bound(problem, (goal,), parts=True)
+    return closed_bound(problem, goal)
 
 
 def estimates_words(problem: Problem) -> bool:

@@ -72,24 +72,33 @@ def _quickest(problem: Problem, goal: Goal, far: float) -> float:
 
 
 @kept_by_first
-def least_price_per_metre(automaton: Automaton, cost: StageCost) -> float:
-    """Cost per metre of a library's cheapest trim or maneuver, by its displacement; at least 0."""
+def least_price_per_metre(automaton: Automaton, cost: StageCost, parts: bool = False) -> float:
+    """Cost per metre of a library's cheapest trim or maneuver, by its displacement; at least 0.
+
+    Of maneuvers that may begin and end in their middle, by the way of their `parts`.
+    """
     still, name = origin_of(automaton, automaton.trims[0]), automaton.trim_names[0]
     priced = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
     places = [0, 1, *range(3, still.size)]
     speeds = np.linalg.norm(automaton.body_velocities[:, places], axis=1)
     prices = (priced.rates[speeds > 0.0] / speeds[speeds > 0.0]).tolist()
     for maneuver in automaton.maneuvers:
-        distance = float(np.linalg.norm(maneuver.displacement[places]))
-        if distance > 0.0:
-            prices.append(priced.maneuver_cost(maneuver) / distance)
+        ways = np.linalg.norm(maneuver.displacement[None, places], axis=1)
+        costs = np.array([priced.maneuver_cost(maneuver)])
+        if parts and (course := maneuver.course) is not None:
+            states = np.concatenate([course.reduced_state[:-1], course.reduced_state[1:]])
+            controls = np.tile(course.control[:-1], (2, 1))
+            twists = automaton.model.body_velocity(states, controls)
+            costs = maneuver.cost_multiplier * cost.rates(controls, twists)
+            ways = np.linalg.norm(twists[:, places], axis=1)
+        prices += (costs[ways > 0.0] / ways[ways > 0.0]).tolist()
     return max(0.0, min(prices, default=0.0))
 
 
-def straight_bound(problem: Problem, goals: Sequence[Goal]) -> float:
+def straight_bound(problem: Problem, goals: Sequence[Goal], *, parts: bool = False) -> float:
     """No plan to one of some goals costs less: at the greatest speed, or the best price of words.
 
-    It holds whatever the trims at both ends are.
+    It holds whatever the trims at both ends are, and within maneuvers where `parts` of them count.
     """
     cost = terms_of(problem.cost)
     far = [(goal, goal.off(problem.start)[0]) for goal in goals]
@@ -97,17 +106,19 @@ def straight_bound(problem: Problem, goals: Sequence[Goal]) -> float:
     known = cost.length * straight if cost else 0.0
     if cost:
         known += cost.time * min(_quickest(problem, goal, off) for goal, off in far)
-    return known if problem.has_states else max(known, straight * _price_of_words(problem.setting))
+    if problem.has_states:
+        return known
+    return max(known, straight * _price_of_words(problem.setting, parts))
 
 
 @kept_by_first
-def _price_of_words(setting: Problem) -> float:
+def _price_of_words(setting: Problem, parts: bool) -> float:
     """Cost per metre of the cheapest word, where all plans are words of the library; else 0."""
     from maneuver_automaton.planning.polishing import why_not_polished
     from maneuver_automaton.refinement.stop_and_steer import follows_paths
 
     words = why_not_polished(setting) and not follows_paths(setting.automaton.model)
-    return least_price_per_metre(setting.automaton, setting.cost) if words else 0.0
+    return least_price_per_metre(setting.automaton, setting.cost, parts) if words else 0.0
 
 
 def bound_along_paths(problem: Problem) -> LowerBound:

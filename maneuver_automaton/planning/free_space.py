@@ -130,7 +130,7 @@ class AllWords(PlanningStep):
             found.counts["words_that_hit"] = found.refused(Condition.COLLISION)
         if not found.plans:
             ended.why = self._why_none(found)
-        elif self.proven and not any(one.tolerance_m or one.tolerance_rad for one in problem.goals):
+        elif self.proven and self.candidates and not problem.has_tolerance:
             ended.bound = LowerBound(value=self.candidates[0].cost, kind="exhaustive")
         else:
             ended.bound = bounds.formula_bound(problem)

@@ -8,10 +8,12 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.bounds import cell_proofs, pose_scene
-from maneuver_automaton.bounds.cells import finer, first_cells, on_finer
+from maneuver_automaton.bounds.cells import PoseCells, finer, first_cells, on_finer
 from maneuver_automaton.bounds.families import motions_of
 from maneuver_automaton.bounds.levels import _goal_cells, _in_the_plane, _nodes_of
 from maneuver_automaton.bounds.program import program_of, slope
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.models import UserModel
 from tests.quickly import quick_are
 
 CAR = ma.Car(wheelbase=2.8, max_steering=0.6)
@@ -127,6 +129,29 @@ def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
     assert 0.8 * cost < cut.value <= cost
     assert cut.kind == "cells"
     assert [value for _, value in cut.history] == sorted(value for _, value in cut.history)
+
+
+def test_a_goal_has_cells_at_both_ends_of_a_circle_that_is_opened():
+    """Those of one end were left out: 1.89 m were proven of a straight way of 0.8 m."""
+    active = np.ones((1, 1, 7), dtype=np.uint8)
+    sizes = {"size": 1.0, "headings": 8, "low": np.array([0, 0, 2])}
+    cells = PoseCells(active=active, round_trip=False, **sizes)
+    at = cells.coordinates(np.array([0.5, 0.5, 0.4]))
+    assert [k for *_, k in cells.around(at, (0.0, 2.5))] == [0, 1, 4, 5, 6]
+
+
+def test_no_motions_are_known_where_to_sink_costs_less_than_to_rest():
+    """Of a fixed time, less rest is left: 12.8 were proven of a plan of 9.9."""
+    names = {"control_names": ("speed", "turn_rate", "lift")}
+    heavy = UserModel(
+        name="heavy", group=SE2xR, velocity=lambda z, u: [u[0], 0, u[1], u[2] - 1], **names
+    )
+    controls = {"rest": (0, 0, 1), "ahead": (1, 0, 1), "left": (1, 1, 1), "sink": (0, 0, 0.5)}
+    robot = ma.Automaton.of_controls(heavy, controls)
+    cost, fixed = ma.Cost(effort=1.0), ma.Horizon(time=9.0)
+    sinking = ma.Problem(robot, [0, 0, 0, 0], [3, 0, 0, -3], cost=cost, horizon=fixed)
+    assert motions_of(sinking) is None
+    assert motions_of(replace(sinking, horizon=ma.Horizon())) is not None
 
 
 def test_every_sideways_motion_is_an_average_of_motions_of_its_own_gear():

@@ -44,6 +44,9 @@ def test_it_is_as_fast_as_it_is_stated():
     limits["reduced_limits"] = np.array([[0.0, 0.4], [-np.inf, np.inf]])
     boat = replace(RIVER, **limits)
     assert greatest_speed(in_world(boat)) == pytest.approx(np.hypot(1.3, 1.1))
+    lift = replace(boat, group=translations(3), velocity=lambda z, u: [0.0, u[0], 5.0 * u[0]])
+    assert greatest_speed(in_world(lift)) == pytest.approx(np.hypot(0.6, 3.0))
+    assert greatest_speed(in_world(lift), axes=(3,)) == pytest.approx(3.0)
 
 
 def test_its_components_are_those_of_its_arrays():

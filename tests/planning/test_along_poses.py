@@ -9,8 +9,10 @@ import maneuver_automaton as ma
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import plan_to_dict
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import Workspace
+from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.writing import to_yaml
 
@@ -189,6 +191,64 @@ def test_a_gate_is_crossed_and_a_stop_lasts():
     assert "rest" in result.plan.word
     (entry, stop) = plan_to_dict(result)["via"]
     assert (entry["number"], stop["number"], stop["time_s"]) == (1, 2, pytest.approx(6.0))
+
+
+def by_one_maneuver(model, driven, *, goal, via, **more):
+    """A problem whose library is a rest and one maneuver that ends in it, and the plan of that."""
+    none, state = np.zeros(2), np.zeros(len(model.reduced_names))
+    rest = ma.Trim(name="rest", body_velocity=START, control=none, reduced_state=state)
+    controls, times = zip(*driven, strict=True)
+    course = drive(model, state, control=controls, durations=times)
+    there = ma.Maneuver.along(course, name="there", source="rest", target="rest")
+    known = ma.Plan(START, [rest, rest], durations=[0.0, 0.0], maneuvers=[there])
+    library = ma.Automaton(model, (rest,), (there,))
+    return ma.Problem(library, START, goal, via=ma.Via(via), **more), known
+
+
+def in_motion():
+    limits = {"max_acceleration": 0.2, "max_angular_acceleration": 2.0}
+    model = ma.SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, **limits)
+    driven = [([0.2, 0], 5), ([0, 0], 1), ([-0.2, 0], 5)]
+    return by_one_maneuver(model, driven, goal=[6, 0, 0], via=[3, 0, 0])
+
+
+def out_and_back():
+    driven, one = (
+        [([1, 0], 4), ([-1, 0], 5)],
+        drive(ma.Unicycle(), [], control=[[1, 0]], durations=[1]),
+    )
+    problem, known = by_one_maneuver(ma.Unicycle(), driven, goal=[-1, 0, 0], via=[4, 0, 0])
+    step = ma.Maneuver.along(one, name="step", source="rest", target="rest", cost_multiplier=9.0)
+    maneuvers = *problem.automaton.maneuvers, step
+    return replace(problem, automaton=replace(problem.automaton, maneuvers=maneuvers)), known
+
+
+def bent():
+    """With its trailer straight, it would touch a disc behind it."""
+    model = ma.CarWithTrailer(wheelbase=1.0, hitch_length=1.5, max_steering=0.6, max_speed=1.0)
+    there = SE2.exp([2.0, 0.0, 2.0 * np.tan(0.5)])
+    disc = ma.Disc(0.1, there.act(np.array([-1.5, 0.0])))
+    driven = [([1, 0.5], 2), ([-1, 0.5], 2), ([1, 0], 1)]
+    bodies = {"footprint": ma.Box([0.3, 0.2]), "parts": {"trailer": ma.Box([0.3, 0.1])}}
+    return by_one_maneuver(model, driven, goal=[1, 0, 0], via=there.pose, obstacles=disc, **bodies)
+
+
+def cheaper_rest():
+    controls = {"steered": (0.0, 0.6), "rest": (0.0, 0.0), "ahead": (1.0, 0.0)}
+    car = ma.Automaton.of_controls(ma.Car(wheelbase=1.0, max_steering=0.8), controls)
+    trims = [car["ahead"], car["rest"], car["ahead"]]
+    known = ma.Plan(START, trims, durations=[3.0, 2.0, 3.0])
+    stay, cost = ma.Via([3, 0, 0], stay_s=2.0), ma.Cost(time=0.1, effort=1.0)
+    return ma.Problem(car, START, [6, 0, 0], via=stay, cost=cost), known
+
+
+@pytest.mark.parametrize("stated", [in_motion, out_and_back, bent, cheaper_rest])
+def test_nothing_is_proven_against_a_plan_that_passes(stated):
+    problem, known = stated()
+    assert (judged := ma.verify(problem, known)).passed
+    result = ma.plan(replace(problem, search=ma.SearchSettings(max_expansions=100)))
+    assert result.status in (ma.PlanStatus.FOUND, ma.PlanStatus.NO_PLAN)
+    assert (result.lower_bound or 0.0) <= judged.cost * (1.0 + 1e-9)
 
 
 def test_among_obstacles():

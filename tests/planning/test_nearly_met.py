@@ -108,3 +108,14 @@ def test_with_inertia_a_goal_a_few_nanometres_ahead_is_polished_to_a_moment():
     result = ma.plan(ma.Problem(library, [0, 0, 0], [4e-9, 0, 0], search=search), time_limit=60)
     assert result.plan is not None, result.reason
     assert result.cost < 0.1
+
+
+def test_a_goal_that_no_word_is_found_to_end_at_may_be_met_all_the_same():
+    """All words of two trims were searched, none was kept, and the first of none was asked for."""
+    controls = {"ahead": (0.5, 0.0), "back": (-1.0, 0.0), "left": (1.0, 0.6)}
+    car = ma.Automaton.of_controls(ma.Car(wheelbase=1.0, max_steering=0.8), controls)
+    start = [0.11117368254380927, 0.004233956488228028, -6.207053778064691]
+    goal = [0.6402014902193464, 0.1476574797471499, -5.829828934702276]
+    result = ma.plan(ma.Problem(car, start, goal, horizon=ma.Horizon(max_trims=2)))
+    assert result.plan is not None
+    assert result.lower_bound <= result.cost
