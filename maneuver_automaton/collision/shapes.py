@@ -280,6 +280,13 @@ class Obstacle:
         """From when until when [s] it is there."""
         return (-math.inf, math.inf) if self.present_s is None else self.present_s
 
+    def lasts(self, *, fleeting: bool) -> tuple[float, float]:
+        """`presence`; one that is `fleeting`, as on roads, is there while its motion lasts."""
+        if not fleeting or self.motion is None or self.present_s is not None:
+            return self.presence
+        first, last = self.motion.time[[0, -1]].tolist()
+        return first, last
+
     def at(self, time: float) -> Shape:
         """The shape where it is at `time` [s]."""
         return self.shape if self.motion is None else self.shape.moved(SE2(self.motion.at(time)))

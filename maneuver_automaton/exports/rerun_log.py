@@ -201,10 +201,10 @@ def _log_surroundings(log: _Log, recording: Recording) -> None:
 def _log_moving(
     log: _Log, recording: Recording, one: Obstacle, at: str, rings: list[Array]
 ) -> None:
-    """A moving obstacle as long as it is there; on roads, as long as it was recorded."""
+    """A moving obstacle as long as it is there."""
     assert one.motion is not None
     begin, end = recording.begin, recording.end
-    first, last = one.motion.time[[0, -1]].tolist() if recording.world.fleeting else (begin, end)
+    first, last = one.lasts(fleeting=recording.world.fleeting)
     low, high = max(first, begin), min(last, end)
     if low > high:
         return

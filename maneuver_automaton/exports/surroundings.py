@@ -64,5 +64,8 @@ def solids_of(recording: Recording) -> Iterator[tuple[Any, Any, float]]:
         elif one.motion is None:
             yield one, solid(one.shape), begin
         else:
-            for time in (time for time in times if world.is_there(one, time)):
+            first, last = one.lasts(fleeting=world.fleeting)
+            seen = [time for time in times if world.is_there(one, time)]
+            brief = [max(first, begin)] if max(first, begin) <= min(last, recording.end) else []
+            for time in seen or brief:  # at least once, where it is there between two times alone
                 yield one, solid(one.at(time)), time

@@ -177,7 +177,7 @@ SLACK_S = 1e-9
 MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MovingShape:
     """The path around a moving shape, in its own frame."""
 
@@ -187,7 +187,7 @@ class MovingShape:
 
     def there(self, time: float) -> bool:
         """Whether it is there at `time` [s]."""
-        return self.presence[0] <= time <= self.presence[1]
+        return self.presence[0] - SLACK_S <= time <= self.presence[1] + SLACK_S
 
     def at(self, time: float) -> Path:
         """Where it is at `time` [s]."""
@@ -284,15 +284,9 @@ def static_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
 
 
 def moving_shapes(obstacles: Sequence[AnyObstacle], *, fleeting: bool = False) -> list[MovingShape]:
-    """The moving shapes, ready to be drawn at many times; `fleeting` ones last as their motion."""
+    """The moving shapes, ready to be drawn at many times; `fleeting` as `Obstacle.lasts` has it."""
     return [
-        MovingShape(
-            path=shape_path(one.shape),
-            motion=one.motion,
-            presence=(one.motion.time[0] - SLACK_S, one.motion.time[-1] + SLACK_S)
-            if fleeting
-            else one.presence,
-        )
+        MovingShape(shape_path(one.shape), one.motion, presence=one.lasts(fleeting=fleeting))
         for one in obstacles
         if isinstance(one, Obstacle) and one.motion is not None
     ]

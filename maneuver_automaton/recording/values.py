@@ -286,12 +286,10 @@ class Environment:
 
     __repr__ = brief
 
-    def is_there(self, obstacle: AnyObstacle, time: float) -> bool:
+    def is_there(self, obstacle: Obstacle, time: float) -> bool:
         """Whether an obstacle is there at a time [s]."""
-        if not (self.fleeting and isinstance(obstacle, Obstacle) and obstacle.motion is not None):
-            return True
-        first, last = obstacle.motion.time[[0, -1]].tolist()
-        return bool(first - 1e-9 <= time <= last + 1e-9)
+        first, last = obstacle.lasts(fleeting=self.fleeting)
+        return first - 1e-9 <= time <= last + 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

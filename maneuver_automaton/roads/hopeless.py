@@ -28,7 +28,6 @@ from maneuver_automaton.roads.scene import (
     RoadScene,
     geometry_of,
     outlines_of,
-    presence_of,
 )
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -68,7 +67,7 @@ def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]
     body, now = _bodies(scene.start.middle[None], size), scene.start.time
     there = [
         one.shape if one.motion is None else one.at(now)
-        for one, begin, end in [(one, *presence_of(one)) for one in scene.traffic]
+        for one, begin, end in [(one, *one.lasts(fleeting=True)) for one in scene.traffic]
         if begin <= now <= end
     ]
     edge = shapely.boundary(RECENT.once(drivable_area, scene.lanelets))
@@ -184,7 +183,7 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any, least: float) -
     walls: dict[str, list[Wall]] = {}
     for one in scene.traffic:
         if one.motion is None or not np.ptp(one.motion.pose, axis=0).any():
-            begin, end = presence_of(one)
+            begin, end = one.lasts(fleeting=True)
             place = one.shape if one.motion is None else one.at(begin)
             radius = place.radius if isinstance(place, Disc) else 0.0
             grown = shapely.buffer(geometry_of(place), radius + 0.5 * least)

@@ -29,7 +29,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area, obstacles_in
 from maneuver_automaton.roads.plans import AT_REST
-from maneuver_automaton.roads.scene import EXACT, GoalRegion, RoadScene, RoadStart, presence_of
+from maneuver_automaton.roads.scene import EXACT, GoalRegion, RoadScene, RoadStart
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 AT_LINE = 3.0  # [m] from the body to a line: who stands there has stopped at it
@@ -237,7 +237,7 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
 
 def nearest_to(plan: Plan, vehicle: RoadVehicle, one: Obstacle, *, enough: float = 0.0) -> Least:
     """The least clearance of a plan to a road user, which counts only while it is there."""
-    body, there = (vehicle.footprint,), presence_of(one)
+    body, there = (vehicle.footprint,), one.lasts(fleeting=True)
     return closest_to(plan, vehicle.model, (one,), footprint=body, within=there, enough=enough)
 
 

@@ -96,7 +96,7 @@ class RoadScene:
 
     def present(self, time: float) -> list[Obstacle]:
         """Obstacles that are on the road at `time` [s]."""
-        there = [(one, *presence_of(one)) for one in self.traffic]
+        there = [(one, *one.lasts(fleeting=True)) for one in self.traffic]
         most = TIME_TOLERANCE
         return [one for one, first, last in there if first - most <= time <= last + most]
 
@@ -148,14 +148,6 @@ def moved_obstacle(one: Obstacle, by: SE2, *, digits: int | None = None) -> Obst
     if one.motion is None:
         return replace(one, shape=_near_shape(one.shape, digits))
     return replace(one, motion=replace(one.motion, pose=rounded(one.motion.pose, digits)))
-
-
-def presence_of(one: Obstacle) -> tuple[float, float]:
-    """First and last time [s] at which a road user is there: its recorded times, or always."""
-    if one.motion is None:
-        return -math.inf, math.inf
-    first, last = one.motion.time[[0, -1]].tolist()
-    return first, last
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

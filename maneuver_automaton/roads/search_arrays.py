@@ -40,7 +40,6 @@ from maneuver_automaton.roads.scene import (
     GoalRegion,
     RoadScene,
     outlines_of,
-    presence_of,
 )
 from maneuver_automaton.roads.vehicle import RoadLibrary, RoadVehicle
 
@@ -213,7 +212,7 @@ def clearing_of(
         grown for one in scene.traffic if one.motion is None for grown in _grown(one.shape, more)
     ]
     moving = [one for one in scene.traffic if one.motion is not None]
-    present = [presence_of(one) for one in moving]
+    present = [one.lasts(fleeting=True) for one in moving]
     world = world_of(
         (*land_around(scene, far=far), *still, *moving),
         (vehicle.footprint,),

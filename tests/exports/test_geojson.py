@@ -11,7 +11,10 @@ import shapely
 from shapely.geometry import shape
 
 import maneuver_automaton as ma
+from maneuver_automaton.collision import Disc, Motion, Obstacle
+from maneuver_automaton.exports.surroundings import solids_of
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.recording import recording_of
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends, slalom, trailer
 from tests.plotting.cases import parking_plan
 
@@ -56,6 +59,18 @@ def test_the_trailer_is_swept_too(tmp_path):
     ((swept, _),) = features(document, "swept")
     for body, _ in features(document, "body"):
         assert swept.buffer(1e-6).contains(body)
+
+
+@pytest.mark.parametrize("motion", [None, Motion([0.0, 9.0], [[0, 0, 0], [9, 0, 0]])])
+@pytest.mark.parametrize(
+    ("present", "times"),
+    [((-np.inf, 2.0), [0, 2]), ((5.0, 9.0), [6, 8]), ((2.5, 3.5), [2.5]), ((9.0, np.inf), [])],
+)
+def test_what_comes_and_goes_is_shown_while_it_is_there(motion, present, times):
+    recording = recording_of(parking_plan())
+    door = Obstacle(Disc(0.3), motion=motion, present_s=present)
+    world = replace(recording.world, obstacles=(door,))
+    assert [time for *_, time in solids_of(replace(recording, world=world))] == times
 
 
 def test_no_limit_is_null(tmp_path):

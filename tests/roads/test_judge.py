@@ -48,11 +48,13 @@ def test_distances_are_those_on_paper():
 
 @pytest.mark.parametrize(("begin", "end", "hit"), [(0.0, 9.0, True), (0.0, 1.0, False)])
 def test_road_users_count_while_they_are_there(begin, end, hit):
-    verdict = judged(scene(waiting(begin, end)), VEHICLE, PLAN)
-    assert verdict.hit == (("waiting",) if hit else ())
-    assert verdict.collisions == int(hit)
-    front = VEHICLE.ahead + 0.5 * VEHICLE.length
-    assert verdict.clearance_m == pytest.approx(0.0 if hit else 28.0 - 10.0 - front)
+    said = Obstacle(Box([4.0, 1.8], [30.0, 0.0]), present_s=(begin, end), name="waiting")
+    for there in (waiting(begin, end), said):
+        verdict = judged(scene(there), VEHICLE, PLAN)
+        assert verdict.hit == (("waiting",) if hit else ())
+        assert verdict.collisions == int(hit)
+        front = VEHICLE.ahead + 0.5 * VEHICLE.length
+        assert verdict.clearance_m == pytest.approx(0.0 if hit else 28.0 - 10.0 - front)
 
 
 def test_somebody_who_comes_after_the_end_is_not_met():

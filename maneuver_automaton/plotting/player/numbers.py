@@ -251,20 +251,16 @@ def clearance_entry(
     for one in obstacles:
         if isinstance(one, OccupancyMap):
             flat += [shapely.Polygon(p) for path in map_paths(one) for p in path.to_polygons()]
-        elif one.motion is not None:
-            from_s, until_s = one.presence
-            if leave:  # as long as its motion lasts
-                first, last = one.motion.time[[0, -1]].tolist()
-                from_s, until_s = max(first, from_s), min(last, until_s)
-            there = (times >= from_s) & (times <= until_s)
-            apart = _apart(placed, _moved(one, times))
-            least = np.minimum(least, np.where(there, apart, np.inf))
-        elif heights is not None and one.height is not None:
-            below, above = one.height[0] - heights[:, 1], heights[:, 0] - one.height[1]
-            rise = np.maximum(np.maximum(below, above), 0.0)
-            least = np.minimum(least, np.hypot(_apart(placed, _solid(one.shape)), rise))
-        else:
+        elif one.motion is None and (heights is None or one.height is None):
             flat += list(_solid(one.shape))
+        else:
+            first, last = one.lasts(fleeting=leave)
+            apart = _apart(placed, _solid(one.shape) if one.motion is None else _moved(one, times))
+            if heights is not None and one.height is not None:
+                below, above = one.height[0] - heights[:, 1], heights[:, 0] - one.height[1]
+                apart = np.hypot(apart, np.maximum(np.maximum(below, above), 0.0))
+            there = (times >= first) & (times <= last)
+            least = np.minimum(least, np.where(there, apart, np.inf))
     if flat:
         tree = shapely.STRtree(flat)
         for body in placed:

@@ -264,9 +264,10 @@ class Stage {
       one.pose.forEach((pose, n) => context[n ? "lineTo" : "moveTo"](pose[0], pose[1]));
       context.stroke();
       context.setLineDash([]);
-      const [from, to] = one.present || [null, null];
-      const there = (from === null || time >= from) && (to === null || time <= to);
-      if (one.leaves && (time < one.t[0] - 1e-9 || time > one.t[one.t.length - 1] + 1e-9)) continue;
+      const lasts = one.leaves ? [one.t[0], one.t[one.t.length - 1]] : [null, null];
+      const [from, to] = one.present || lasts;
+      const there = (from === null || time >= from - 1e-9) && (to === null || time <= to + 1e-9);
+      if (one.leaves && !there) continue;
       const path = new Path2D(), pose = posedAt(one, time);
       one.rings.forEach((ring) => trace(path, ring.map((place) => acted(pose, place))));
       context.fillStyle = withAlpha(colors.moving, there ? 0.75 : 0.07);

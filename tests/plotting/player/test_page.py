@@ -141,7 +141,8 @@ def test_clearances_are_distances():
     assert obstacle_entries([door], Local(np.zeros(2)), leave=False)[0]["present"] == [1.0, None]
     tower = Obstacle(Box([2.0, 2.0], [3.0, 0.0]), height=(0.0, 3.0))
     heights = np.array([[7.0, 8.0], [7.0, 8.0], [-2.0, -1.0]])
-    assert apart(tower, heights=heights) == pytest.approx([np.hypot(1.0, 4.0), 4.0, 1.0], abs=1e-4)
+    for one in (tower, replace(tower, present_s=(0.0, 9.0))):
+        assert apart(one, heights=heights) == pytest.approx([np.hypot(1, 4), 4.0, 1.0], abs=1e-4)
     assert clearance_entry(times, robot, []) is None
 
 
