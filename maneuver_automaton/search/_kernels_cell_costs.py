@@ -21,8 +21,7 @@ from maneuver_automaton.search._kernels_cell_turns import (
     TINY,
     UNKNOWN,
     ClosedForm,
-    after_straight,
-    before_straight,
+    beside_straight,
     on_line_and_circle,
     straight_between,
     three_turns,
@@ -30,40 +29,24 @@ from maneuver_automaton.search._kernels_cell_turns import (
 from maneuver_automaton.search._kernels_problem import WordProblem
 from maneuver_automaton.words._kernels_steering import length, phase, radius_of, unit
 
-COARSE = 2  # stretches of all cells of a word, which are looked at first
-PARTS = 4  # of a cell, for which bounds are computed in the end
-
 
 @bare_inner_kernel
 def mark_cheap_cells(known: ClosedForm, reach: float, most: float, live: NDArray[np.bool_]) -> bool:
     """Fill `live` (2, nodes): cells of the free time where a branch may cost less than `most`."""
     # They part [0, reach] evenly; `most` is without what the word costs besides coasting. Many are
-    # looked at together, and apart only where some may be cheap: in the end in parts, because
-    # bounds get close as cells get small, and a bound takes less than a node of the scan. False if
-    # none is live.
+    # looked at together, and halved where some may be cheap. False if none is live.
     live[:] = False
-    found, stack = False, known.stretches
-    parts = PARTS * live.shape[1]
-    top = 0
-    for k in range(COARSE - 1, -1, -1):
-        stack[top, 0], stack[top, 1] = k * parts // COARSE, (k + 1) * parts // COARSE
-        top += 1
+    found, stack, cells = False, known.stretches, live.shape[1]
+    stack[0, 0], stack[0, 1], stack[1, 0], stack[1, 1] = cells // 2, cells, 0, cells // 2
+    top = 2
     while top > 0:
         top -= 1
         low, high = stack[top, 0], stack[top, 1]
-        cell = low // PARTS
-        alone = cell == (high - 1) // PARTS
-        if low == high or (alone and live[0, cell] and live[1, cell]):
-            continue
-        later, earlier = least_costs(known, reach * low / parts, reach * high / parts)
-        one, other = not later > most, not earlier > most  # also where a bound is not a number
-        if alone:
-            one, other = one and not live[0, cell], other and not live[1, cell]
-        if not (one or other):
+        later, earlier = least_costs(known, reach * low / cells, reach * high / cells)
+        if later > most and earlier > most:  # neither where a bound is not a number
             continue
         if high == low + 1:
-            live[0, cell] = live[0, cell] or one
-            live[1, cell] = live[1, cell] or other
+            live[0, low], live[1, low] = not later > most, not earlier > most
             found = True
             continue
         middle = (low + high) // 2
@@ -223,16 +206,16 @@ def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, floa
         later, earlier = three_turns(known, polar, d, (around, turned, spread), rest)
     elif b == 0.0:
         later, earlier = straight_between(known, at_1 + at_2, d, (around, turned, spread), rest)
-    elif a == 0.0:  # the place from which the two turns lead to the goal lies on a line
-        spans = on_line_and_circle(known, d * turn.conjugate() - at_1, two, within)
-        ahead = known.straight[1] - phase_2
-        left = heading - turned - ahead
-        later = after_straight(known, spans[0], ahead, left, spread, rest)
-        earlier = after_straight(known, spans[1], ahead, left, spread, rest)
-    else:  # the same from the goal back
-        spans = on_line_and_circle(known, d * facing.conjugate() - at_2, one, around)
-        ahead = known.straight[1] - phase_1
-        left = heading - turned + ahead
-        later = before_straight(known, spans[0], ahead, left, spread, rest)
-        earlier = before_straight(known, spans[1], ahead, left, spread, rest)
+    else:
+        # The place from which the two turns lead to the goal lies on a line, where the straight is
+        # the first; where it is the last, the same from the goal back.
+        ahead = known.straight[1] - (phase_2 if a == 0.0 else phase_1)
+        if a == 0.0:
+            spans = on_line_and_circle(known, d * turn.conjugate() - at_1, two, within)
+            left = ahead - (heading - turned)
+        else:
+            spans = on_line_and_circle(known, d * facing.conjugate() - at_2, one, around)
+            left = ahead + (heading - turned)
+        later = beside_straight(known, spans[0], ahead, left, spread, rest)
+        earlier = beside_straight(known, spans[1], ahead, left, spread, rest)
     return begun + later, begun + earlier

@@ -43,31 +43,20 @@ class ClosedForm(NamedTuple):
 
 
 @bare_inner_kernel
-def after_straight(
+def beside_straight(
     known: ClosedForm, span: Four, ahead: float, left: float, spread: float, rest: float
 ) -> float:
-    """Lower bound for straight, turn, turn, where a line and a circle meet within `span`."""
+    """Lower bound for two turns after a straight, or before it: a line meets a circle in `span`."""
+    # Seen from the straight: the same turns as a word and as its way back, to the other side.
     first, last, angle, other = span
     if last < 0.0:
         return math.inf
-    _, b, c = known.sides
-    one = least_turn(ahead + angle, ahead + other, b)
-    two = least_turn(left - other - spread, left - angle + spread, c)
-    return least_cost(known, (max(first, 0.0), one, two), rest)
-
-
-@bare_inner_kernel
-def before_straight(
-    known: ClosedForm, span: Four, ahead: float, left: float, spread: float, rest: float
-) -> float:
-    """Lower bound for turn, turn, straight, where a line and a circle meet within `span`."""
-    first, last, angle, other = span
-    if last < 0.0:
-        return math.inf
-    a, b, _ = known.sides
-    one = least_turn(left + angle - spread, left + other + spread, a)
-    two = least_turn(-ahead - other, -ahead - angle, b)
-    return least_cost(known, (one, two, max(first, 0.0)), rest)
+    a, b, c = known.sides
+    near = least_turn(ahead + angle, ahead + other, b if a == 0.0 else -b)
+    far = least_turn(left + angle - spread, left + other + spread, a - c)
+    straight = max(first, 0.0)
+    times = (straight, near, far) if a == 0.0 else (far, near, straight)
+    return least_cost(known, times, rest)
 
 
 @bare_inner_kernel
@@ -144,18 +133,19 @@ def three_turns(
     widest, narrowest = begin_low + end_low, begin_high + end_high
     first, middle = aim - turned - phase_1, phase_1 - phase_2
     last, wide = known.goal[0] - aim + phase_2, off + spread
-    # the angle of at_1 e^{i h_1} is that of d plus a corner on one branch, minus on the other
-    plus = (
-        least_turn(first + nearest_1 - wide, first + farthest_1 + wide, a),
-        least_turn(middle - widest, middle - narrowest, b),
-        least_turn(last + nearest_2 - off, last + farthest_2 + off, c),
-    )
-    minus = (
-        least_turn(first - farthest_1 - wide, first - nearest_1 + wide, a),
-        least_turn(middle + narrowest, middle + widest, b),
-        least_turn(last - farthest_2 - off, last - nearest_2 + off, c),
-    )
-    return least_cost(known, plus, rest), least_cost(known, minus, rest)
+    bounds = (math.inf, math.inf)
+    for _ in range(2):
+        # the angle of at_1 e^{i h_1} is that of d plus a corner on one branch, minus on the other
+        times = (
+            least_turn(first + nearest_1 - wide, first + farthest_1 + wide, a),
+            least_turn(middle - widest, middle - narrowest, b),
+            least_turn(last + nearest_2 - off, last + farthest_2 + off, c),
+        )
+        bounds = bounds[1], least_cost(known, times, rest)
+        nearest_1, farthest_1 = -farthest_1, -nearest_1
+        nearest_2, farthest_2 = -farthest_2, -nearest_2
+        widest, narrowest = -narrowest, -widest
+    return bounds
 
 
 @bare_inner_kernel
@@ -184,25 +174,16 @@ def straight_between(
     one, other = math.atan2(aside, nearest), math.atan2(aside, farthest)
     one, other = min(one, other), max(one, other)
     straight = math.copysign(math.pi, aside)  # the way back is as far from it as the way ahead
-    later, earlier = math.inf, math.inf
-    if farthest - begin >= -TINY * (speed + high):
-        turn = least_turn(first - other - off - spread, first - one + off + spread, a)
-        times = (
-            turn,
-            max(0.0, (nearest - begin) / speed),
-            least_turn(last + one - off, last + other + off, c),
-        )
-        later = least_cost(known, times, rest)
-    if -nearest - begin >= -TINY * (speed + high):
+    bounds = (math.inf, math.inf)
+    for least, most in ((nearest, farthest), (-farthest, -nearest)):
+        cost = math.inf
+        if most - begin >= -TINY * (speed + high):
+            turn = least_turn(first - other - off - spread, first - one + off + spread, a)
+            last_turn = least_turn(last + one - off, last + other + off, c)
+            cost = least_cost(known, (turn, max(0.0, (least - begin) / speed), last_turn), rest)
+        bounds = bounds[1], cost
         one, other = straight - other, straight - one
-        turn = least_turn(first - other - off - spread, first - one + off + spread, a)
-        times = (
-            turn,
-            max(0.0, (-farthest - begin) / speed),
-            least_turn(last + one - off, last + other + off, c),
-        )
-        earlier = least_cost(known, times, rest)
-    return later, earlier
+    return bounds
 
 
 @bare_inner_kernel

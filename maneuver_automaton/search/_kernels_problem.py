@@ -53,8 +53,7 @@ class Momenta(NamedTuple):
     """Bounds of what is locally optimal in words of four trims; see `momenta`."""
 
     rows: IntArray  # (M ** 4, 2) the rows of each word, from and to; 1 and 0 if not known
-    whole: Array  # (R, 3) of all cells of a row: least and most that has to be met, least cost
-    cells: Array  # (R, N, 7) the same for each cell, and from where to where the outer trims lead
+    cells: Array  # (R, N, 7) of what has to be met, the least cost, and of the outer trims
 
 
 class ScanSettings(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_cell_turns import FULL, TINY, least_turn
+from maneuver_automaton.search._kernels_cell_turns import TINY, least_turn
 from maneuver_automaton.search._kernels_problem import (
     AIM,
     FIRST,
@@ -117,13 +117,9 @@ def may_be_optimal(problem: WordProblem, word: IntArray, number: int, upper_boun
     elif one[2] != 0.0:
         way *= facing.conjugate()
         met, first, last = way.imag, goal[2], way.real
-    elif other[2] != 0.0:
-        met, first, last = way.imag, way.real, goal[2]
     else:
-        met, first, last = goal[2] - FULL * math.floor(goal[2] / FULL), 0.0, 0.0
+        met, first, last = way.imag, way.real, goal[2]
     for k in range(known.rows[number, 0], known.rows[number, 1]):
-        if not known.whole[k, 0] <= met <= known.whole[k, 1] or known.whole[k, 2] >= most:
-            continue
         for j in range(known.cells.shape[1]):
             cell = known.cells[k, j]
             if not cell[0] <= met <= cell[1] or cell[2] >= most:

@@ -24,7 +24,7 @@ CELLS = 16
 MOST = 6  # trims of a library whose words are tabulated
 WIDE = 1e-6  # relative, by which all is widened: solutions are off by less
 FAR = 1e12  # in place of infinity
-NONE = Momenta(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, CELLS, 7)))
+NONE = Momenta(np.zeros((0, 2), dtype=np.int64), np.zeros((0, CELLS, 7)))
 
 
 @kept_by_first
@@ -44,6 +44,7 @@ def momenta_of(library: MovingTrims) -> Momenta:
     # Where p_h does not fall along a straight p_y is 0: at p_x, the least length, for any time.
     loose, slight = goes[1:3] & (fall == 0.0), np.abs(fall) <= WIDE * rates.max()
     known &= ~(goes[1:3] & slight & ~loose).any(axis=0) & (least > 1.0 / FAR)
+    known &= ~(goes[0] & goes[3])  # between straights a heading has to be met: it rules out none
     signs = np.array(list(itertools.product((1.0, -1.0), repeat=3))).T
     fits = np.tile(known[:, None], 8)
     for k in range(2):  # p_y has one sign along a straight, and p_h falls by v p_y
@@ -55,8 +56,7 @@ def momenta_of(library: MovingTrims) -> Momenta:
     cells = _cells(library, words[:, number], signs[:, sign], ahead[:, number], fall[:, number])
     rows = np.stack([np.searchsorted(number, range(n**4), side=s) for s in ("left", "right")], -1)
     rows[~known] = 1, 0
-    whole = np.stack([cells[..., 0].min(-1), cells[..., 1].max(-1), cells[..., 2].min(-1)], -1)
-    return Momenta(rows, whole, cells)
+    return Momenta(rows, cells)
 
 
 def _cells(library: MovingTrims, words: IntArray, signs: Array, ahead: Array, fall: Array) -> Array:
@@ -85,14 +85,14 @@ def _cells(library: MovingTrims, words: IntArray, signs: Array, ahead: Array, fa
         goes = (w[trim] == 0.0)[:, None]
         way = np.abs(fall[k, :, None]) * inverse / sizes[k][::-1].clip(min=1.0 / FAR)
         way = np.where(loose[k], ways, way)
-        turn = _whole(_scaled(angles[k] - angles[k + 1][::-1], np.sign(w[trim])))
+        least, most = _scaled(angles[k] - angles[k + 1][::-1], np.sign(w[trim]))
+        turn = np.where(most // FULL_TURN > least // FULL_TURN, 0.0, least % FULL_TURN)
         pace = np.where(goes, np.abs(v[trim, None]), np.abs(w[trim, None]))
-        cost += library.rates[trim, None] * np.where(goes, way[0], turn[0]) / pace
+        cost += library.rates[trim, None] * np.where(goes, way[0], turn) / pace
         along = along + np.where(goes, _times(_scaled(way, np.sign(v[trim])), cosines[k]), 0.0)
         across = across - np.where(goes, _scaled(inverse, fall[k])[::-1], 0.0)
     # Between two turns the distance of their centres has to be met, and its direction tells the
-    # turns; after a straight, or before one, how far aside of it a centre lies; between two
-    # straights, which go any way, the heading.
+    # turns; after a straight, or before one, how far aside of it a centre lies.
     before, after = (w[words[[0, 3]]] == 0.0)[..., None]
     sine, cosine = np.where(after, sines[2], sines[0]), np.where(after, cosines[2], cosines[0])
     aside = _times(along, sine) + _times(across, cosine)
@@ -103,9 +103,7 @@ def _cells(library: MovingTrims, words: IntArray, signs: Array, ahead: Array, fa
     first, last = np.where(before, rest, first) + wide, np.where(after, rest, last) + wide
     square = _times(along, along).clip(0.0) + _times(across, across).clip(0.0)
     met = np.where(before | after, aside, square)
-    met, any_way = met + wide * (1.0 + np.abs(met)), FAR / WIDE * wide
-    met = np.where(before & after, _whole(wide - turned[::-1]), met)
-    first, last = (np.where(before & after, any_way, one) for one in (first, last))
+    met += wide * (1.0 + np.abs(met))
     return np.stack([*met, cost * (1.0 - WIDE), *first, *last], axis=-1)
 
 
@@ -118,12 +116,6 @@ def _times(one: Array, other: Array) -> Array:
     """Bounds of a product."""
     products = np.stack([*one * other, *one * other[::-1]])
     return np.stack([products.min(axis=0), products.max(axis=0)])
-
-
-def _whole(bounds: Array) -> Array:
-    """Bounds of an angle less whole turns, from 0 on."""
-    bounds = bounds - FULL_TURN * np.floor(bounds[0] / FULL_TURN)
-    return np.where(bounds[1] < FULL_TURN, bounds, np.array([0.0, FULL_TURN])[:, None, None])
 
 
 def _direction(along: Array, across: Array) -> Array:
