@@ -44,7 +44,7 @@ from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 4  # trims of one word, the free turn among them: three in closed form, one scanned
 NODES = 64  # per scanned time, bisected where the function bends
-BLEND = 0.618034  # [s/m]
+BLEND = 0.618034  # [s/m] of altitude in the condition of the time; hardly a ratio of two trims
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
 SECONDS_IF_FREE = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by trims, for words of no linear condition
